@@ -10,15 +10,8 @@ from cosmic.app.rig import Rig
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.errors import CosmicError
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.core.motion.orders import (
-    Calibrate,
-    MoveBy,
-    MoveTo,
-    Order,
-    Reference,
-    Reservation,
-    Step,
-)
+from cosmic.mico.core.motion.messages import Order
+from cosmic.mico.core.motion.orders import Calibrate, MoveBy, MoveTo, Reference, Reservation, Step
 
 NONSENSE: Final[Sequence[Any]] = (
     None, "abc", "5 kg", b"5", float("nan"), float("inf"), -float("inf"), 1e308, 2**70, -1, 0,

@@ -31,8 +31,9 @@ if TYPE_CHECKING:
     )
     from cosmic.frame.operation import Progress, Task
     from cosmic.frame.verdict import MoveVerdict, Reason
-    from cosmic.mico.api.axis import Axis, Jogging
+    from cosmic.mico.api.axis import Axis
     from cosmic.mico.api.group import GroupMovement
+    from cosmic.mico.api.jogging import Jogging
     from cosmic.mico.api.mico import Mico
     from cosmic.mico.core.motion.movement import Movement
 
@@ -61,7 +62,8 @@ _HOMES = {
     ),
     "cosmic.frame.operation": ("Progress", "Task"),
     "cosmic.frame.verdict": ("MoveVerdict", "Reason"),
-    "cosmic.mico.api.axis": ("Axis", "Jogging"),
+    "cosmic.mico.api.axis": ("Axis",),
+    "cosmic.mico.api.jogging": ("Jogging",),
     "cosmic.mico.api.group": ("GroupMovement",),
     "cosmic.mico.api.mico": ("Mico",),
     "cosmic.mico.core.motion.movement": ("Movement",),

@@ -64,11 +64,12 @@ from cosmic.frame.network.errors import (
 from cosmic.frame.operation import Operation, Progress, Task
 from cosmic.frame.plan_shape import PlanStatus
 from cosmic.frame.renamed import Renamed
-from cosmic.mico.api.axis import Axis, Jogging
+from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.axis_shape import AxisMovable
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.move_status import MoveStatus
 from cosmic.mico.api.poses import Poses

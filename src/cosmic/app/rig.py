@@ -260,8 +260,7 @@ class Rig:
     @property
     def stopped(self) -> str | None:
         """Why motion is stopped, or None while it is allowed."""
-        mico = self._platform.mico
-        return mico.manager.latch.state.reason if mico is not None else None
+        return self._mico.stop_state.reason if self._mico is not None else None
 
     def stop(self, reason: str = "stop from a script") -> None:
         """Stop every axis now; nothing moves again before `reset_stop`. Returns at once.
@@ -283,8 +282,8 @@ class Rig:
 
     def reset_stop(self) -> None:
         """Allow motion again; what was stopped does not go on by itself."""
-        if self._platform.mico is not None:
-            self._platform.mico.manager.reset_stop()
+        if self._mico is not None:
+            self._mico.reset_stop()
         if self._has_outputs:
             self.daqco.reset_outputs()
 

@@ -15,7 +15,10 @@ from cosmic.autonomy.tools import axis_targets, expected, tip_um
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.operation import Task
 from cosmic.mico.api.application_base import MicoApplicationBase
+from cosmic.mico.api.mico import mico_of
+from cosmic.mico.api.news import SentMotion
 from cosmic.mico.core.motion.orders import MoveTo
+from cosmic.mico.core.motion.positioner import positions_of
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.coordinate_transform import (
     CalibrationShown,
@@ -66,9 +69,9 @@ class PlatformTransform(CoordinateTransform):
         version: str = "",
     ) -> None:
         self._vico = vico
-        self._manager = mico.manager
+        self._mico = mico_of(mico, SOURCE)
         self._tools = {each.name: each for each in vico.settings.tool}
-        axes = [each.name for each in mico.manager.settings.positioner]
+        axes = [each.name for each in self._mico.settings.positioner]
         if mistakes := tool_mistakes(vico.settings.tool, axes):
             raise ConfigError("\n".join(mistakes))
         self.calibrations = Calibrations(vico.units, self._tools, folder)
@@ -146,10 +149,10 @@ class PlatformTransform(CoordinateTransform):
         if tip is None:
             raise NotAvailable(f"{what}: its position is unknown; initialise the platform")
         x_um, y_um = self.map_of(image, tip[2], what).to_um(point_px).tolist()
-        motions = {
+        motions: dict[str, SentMotion] = {
             axis: MoveTo(target, "um") for axis, target in axis_targets(tool, x_um, y_um).items()
         }
-        self._manager.order_together(motions, source=SOURCE)
+        self._mico.begin_together(motions, source=SOURCE)
         logger.info("click: %s to %.1f, %.1f um", what, x_um, y_um)
         return f"{tool.shown} moves to x {x_um:.1f}, y {y_um:.1f} µm"
 
@@ -173,15 +176,14 @@ class PlatformTransform(CoordinateTransform):
 
     def positions(self) -> dict[str, float]:
         """Return where the axes are that are known, in gate coordinates."""
-        states = self._manager.states().values()
-        return {each.name: each.position for each in states if each.position is not None}
+        return positions_of(self._mico.states())
 
     # Measuring
 
     @override
     def calibrate_stage(self, tool: str, camera: str) -> Task:
         settings = self._tool(tool)
-        procedure = StageProcedure(self._vico, self._manager, self.calibrations, settings, camera)
+        procedure = StageProcedure(self._vico, self._mico, self.calibrations, settings, camera)
         return self._begin(f"Calibrating {camera} by {settings.shown}", procedure.run)
 
     @override
@@ -190,7 +192,7 @@ class PlatformTransform(CoordinateTransform):
         if not axis:
             raise NotAvailable("no axis turns the plate; name it as vico.table_axis")
         procedure = RotationProcedure(
-            self._vico, self._manager, self.calibrations, self._plate_map, camera, axis
+            self._vico, self._mico, self.calibrations, self._plate_map, camera, axis
         )
         return self._begin(f"Rotation centre of {axis}", procedure.run)
 

@@ -7,9 +7,9 @@ from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError, MoveCancelled, StoppedError
 from cosmic.frame.operation import Task
 from cosmic.frame.units import AxisUnit
-from cosmic.mico.api.group import move_together
+from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.motion.orders import MoveTo
-from cosmic.mico.core.ports import ManagerPort
+from cosmic.mico.core.motion.positioner import positions_of
 
 logger = logging.getLogger(__name__)
 
@@ -17,16 +17,15 @@ logger = logging.getLogger(__name__)
 class Mover:
     """Moves some axes for one task, and remembers where they stood."""
 
-    def __init__(self, manager: ManagerPort, axes: Mapping[str, AxisUnit], clock: Clock) -> None:
-        self._manager = manager
+    def __init__(self, mico: Mico, axes: Mapping[str, AxisUnit], clock: Clock) -> None:
+        self._mico = mico
         self._axes = dict(axes)
         self._clock = clock
         self._before: dict[str, float] = {}
 
     def positions(self) -> dict[str, float]:
         """Return where all axes are that are known, in gate coordinates."""
-        states = self._manager.states().values()
-        return {each.name: each.position for each in states if each.position is not None}
+        return positions_of(self._mico.states())
 
     def remember(self) -> dict[str, float]:
         """Return where its axes stand, which is where they go back to."""
@@ -46,8 +45,12 @@ class Mover:
         """
         if task.cancel_requested:
             raise MoveCancelled(f"{task.title} was cancelled")
-        motions = {name: MoveTo(target, self._axes[name]) for name, target in targets.items()}
-        move_together(self._manager, motions, task, source=source)
+        together = self._mico.begin_together(
+            {name: MoveTo(target, self._axes[name]) for name, target in targets.items()},
+            source=source,
+        )
+        task.on_cancel(together.cancel)
+        together.wait()
         return self._clock.now_s()
 
     def go_back(self, task: Task, source: str) -> None:

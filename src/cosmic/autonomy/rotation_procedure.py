@@ -10,7 +10,7 @@ from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.moving import Mover
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.operation import Task
-from cosmic.mico.core.ports import ManagerPort
+from cosmic.mico.api.mico import Mico
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.core.calibration import RotationCentre
 from cosmic.vico.core.calibration_fit import CalibrationRefused, RotationFit, fit_rotation
@@ -34,7 +34,7 @@ class RotationProcedure:
     def __init__(
         self,
         vico: VicoApplication,
-        manager: ManagerPort,
+        mico: Mico,
         calibrations: Calibrations,
         plate_map: Callable[[CameraImage], PixelMap],
         camera: str,
@@ -46,7 +46,7 @@ class RotationProcedure:
         self._plate_map = plate_map
         self._camera = camera
         self._axis = axis
-        self._mover = Mover(manager, {axis: "deg"}, vico.clock)
+        self._mover = Mover(mico, {axis: "deg"}, vico.clock)
         self._source = f"rotation centre of {axis}"
 
     def run(self, task: Task) -> None:

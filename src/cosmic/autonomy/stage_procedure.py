@@ -16,7 +16,7 @@ from cosmic.autonomy.moving import Mover
 from cosmic.autonomy.tools import axis_targets, tip_um
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.operation import Task
-from cosmic.mico.core.ports import ManagerPort
+from cosmic.mico.api.mico import Mico
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.core.calibration import Plane
 from cosmic.vico.core.calibration_fit import CalibrationRefused, MapFit, Sighting, fit_map
@@ -92,7 +92,7 @@ class StageProcedure:
     def __init__(
         self,
         vico: VicoApplication,
-        manager: ManagerPort,
+        mico: Mico,
         calibrations: Calibrations,
         tool: ToolSettings,
         camera: str,
@@ -101,7 +101,7 @@ class StageProcedure:
         self._calibrations = calibrations
         self._tool = tool
         self._camera = camera
-        self._mover = Mover(manager, {tool.x_axis: "um", tool.y_axis: "um"}, vico.clock)
+        self._mover = Mover(mico, {tool.x_axis: "um", tool.y_axis: "um"}, vico.clock)
         self._clock = vico.clock
         self._source = f"calibration of {camera}"
 

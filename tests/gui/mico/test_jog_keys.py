@@ -128,7 +128,7 @@ def test_a_window_that_was_busy_says_that_the_jog_ended(
     slow: MicoWidget, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hold(qtbot, slow, Qt.Key.Key_D, "left.x")
-    monkeypatch.setattr("cosmic.mico.api.axis.Jogging.renew", lambda _jogging: None)
+    monkeypatch.setattr("cosmic.mico.api.jogging.Jogging.renew", lambda _jogging: None)
     line = part(slow.cards["left.x"], "status", QLabel)
     qtbot.waitUntil(lambda: "not renewed in time" in line.text())
     qtbot.keyRelease(slow.focusWidget(), Qt.Key.Key_D)

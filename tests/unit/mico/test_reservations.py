@@ -9,7 +9,8 @@ import pytest
 import cosmic
 from cosmic.frame.verdict import Reason
 from cosmic.mico.core.motion.checks import Request
-from cosmic.mico.core.motion.orders import Jog, MoveBy, MoveTo, Order, Reservation
+from cosmic.mico.core.motion.messages import Order
+from cosmic.mico.core.motion.orders import Jog, MoveBy, MoveTo, Reservation
 from cosmic.mico.hw.interface import Channel
 from unit.mico.rigs import listen, mico, wait_until
 

@@ -8,7 +8,7 @@ import cosmic
 from cosmic.frame.clock import WALL
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.motion.jog import HandLostError
-from cosmic.mico.core.motion.orders import Order
+from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.hw.interface import Channel
 from unit.mico.rigs import mico, wait_until
 

@@ -152,7 +152,7 @@ class OperatorWindow(CosmicServerGui):
         column = QVBoxLayout(panel)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        column.addWidget(HintBar(first_steps(application.manager.settings, stop_key), settings))
+        column.addWidget(HintBar(first_steps(gui.mico.settings, stop_key), settings))
         column.addWidget(gui, 1)
         self.add_panel(MICO, panel, Qt.DockWidgetArea.LeftDockWidgetArea, scroll=False)
         self._mico_gui = gui
@@ -359,11 +359,12 @@ class OperatorWindow(CosmicServerGui):
 
     def halt_all(self) -> None:
         """Stop the axes that move, without latching; any thread."""
-        if self._mico_gui is None or self._platform.mico is None:
+        if self._mico_gui is None:
             return
-        for name, state in self._platform.mico.manager.states().items():
+        mico = self._mico_gui.mico
+        for name, state in mico.states().items():
             if state.in_motion:
-                self._mico_gui.mico[name].halt()
+                mico[name].halt()
 
     def _is_moving(self) -> bool:
         """Tell whether Escape has something to stop."""

@@ -2,8 +2,7 @@
 
 import logging
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from itertools import count
 from threading import Lock
 from typing import Any, Final, get_origin
@@ -24,8 +23,8 @@ from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable, Protoc
 from cosmic.frame.events import Event
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.conform import Mismatch, conform
-from cosmic.frame.network.errors import StationAway
 from cosmic.frame.network.host import KEYS, NOW, NUMBER, STATE, command_name, topic_of
+from cosmic.frame.network.known_state import Address, KnownState
 from cosmic.frame.network.ongoing import Answered, Ended, Ongoing, StateMessage
 from cosmic.frame.network.remote_stream import RemoteStream
 from cosmic.frame.network.remote_task import RemoteTask
@@ -47,44 +46,6 @@ _LOOK_S: Final = 0.05
 _CLOCK_S: Final = 20.0
 _READINGS: Final = 5
 _REMEMBERED: Final = 64
-
-
-@dataclass(frozen=True, slots=True)
-class Address:
-    """Which object of an application.
-
-    Attributes
-    ----------
-    kind : type
-        What it declares.
-    parts : tuple of str
-        Names of the parts that lead to it.
-    keys : tuple of str
-        For those of them that have keys.
-    at : tuple of str
-        Both, in order.
-    """
-
-    kind: type[Declared]
-    parts: tuple[str, ...] = ()
-    keys: tuple[str, ...] = ()
-    at: tuple[str, ...] = ()
-
-    def part(self, name: str, key: str | None = None) -> "Address":
-        """Return the address of a part."""
-        kind = declaration_of(self.kind).parts[name].kind
-        if key is None:
-            return Address(kind, (*self.parts, name), self.keys, (*self.at, name))
-        return Address(kind, (*self.parts, name), (*self.keys, key), (*self.at, name, key))
-
-
-@dataclass(frozen=True, slots=True)
-class _Known:
-    """State of one object, and the number of the message that told it."""
-
-    number: int
-    values: dict[str, object]
-    fixed: dict[str, object]
 
 
 class _Keeper(WorkerThread):
@@ -114,6 +75,11 @@ class ApplicationLink:
         To the station; whoever made it closes it, after `close`.
     name : str
         Under which the station hosts the application.
+
+    Attributes
+    ----------
+    state : KnownState
+        How things stand there, as it was published last.
     """
 
     def __init__(
@@ -136,8 +102,7 @@ class ApplicationLink:
         self._moving: set[Operation[Any]] = set()
         self._keeper = _Keeper(f"remote {name}", self._look, policy)
         self._lock = Lock()
-        self._start = ""
-        self._known: dict[tuple[str, ...], _Known] = {}
+        self.state = KnownState(self.root)
         self._streams: dict[tuple[str, ...], RemoteStream] = {}
         self._answers: dict[object, tuple[float, object]] = {}
         self._asked: set[object] = set()
@@ -198,33 +163,6 @@ class ApplicationLink:
     def missed(self) -> int:
         """How much of all streams did not reach this process."""
         return sum(each.missed for each in list(self._streams.values()))
-
-    def value(self, address: Address, name: str) -> object:
-        """Return a value of the state of an object.
-
-        Raises
-        ------
-        StationAway
-            It was never told, and has no value that stands for that.
-        """
-        known = self._known.get(address.at)
-        if known is not None and name in known.values:
-            return known.values[name]
-        unknown = declaration_of(address.kind).state[name].unknown
-        if unknown is UNKNOWN:
-            raise StationAway(f"{name} is not known: {self._away or 'it was not on_result yet'}")
-        return unknown
-
-    def keys(self, address: Address, name: str) -> tuple[str, ...]:
-        """Return the keys of the parts of that name that there are."""
-        known = self._known.get(address.at)
-        found = known.values.get(name, ()) if known is not None else ()
-        return found if isinstance(found, tuple) else ()
-
-    def there(self, address: Address, name: str) -> bool:
-        """Return whether there is the part of that name, which may be missing."""
-        known = self._known.get(address.at)
-        return known is not None and known.values.get(name) is True
 
     def stream(self, address: Address, name: str) -> RemoteStream:
         """Return a stream of an object."""
@@ -551,48 +489,27 @@ class ApplicationLink:
         """
         if not isinstance(payload, StateMessage):
             raise ProtocolError(f"a {type(payload).__name__} came instead of state")
-        published = dict(_flat(self._address(payload.at), payload.values))
+        published = self.state.checked(payload)
         with self._lock:
-            first = payload.start != self._start
-            if (first and payload.at) or not (
-                payload.whole or self._completes(published, first=first)
-            ):
+            taken = self.state.take(payload, published)
+            if taken is None:
                 self._incomplete = True
                 return False
-            if first:
-                self._known.clear()
-                self._start, self._wall_s = payload.start, None
+            if taken.first:
+                self._wall_s = None
             self._note_wall(payload.wall_s)
-            newer = [at for at in published if self._number(at) < payload.number]
-            changed = [at for at in newer if self._differs(at, published[at])]
-            for at in newer:
-                known = self._known.get(at)
-                fixed = known.fixed if known is not None else {}
-                if payload.whole:
-                    fixed = _fixed(*published[at])
-                self._known[at] = _Known(payload.number, {**fixed, **published[at][1]}, fixed)
             was_away, self._away = self._away, "" if self._here else self._away
             self._heard_wall_s = WALL.now_s()
-        if first:
+        if taken.first:
             self.clock.forget(payload.clock_rate)
             self._clock_wall_s = -float("inf")
-        if newer:
+        changed = list(taken.changed)
+        if taken.newer:
             for each in self._companions:
-                each.on_state(first=first)
+                each.on_state(first=taken.first)
         if was_away != self._away:
             changed.append(())
         self._publish(changed)
-        return True
-
-    def _completes(
-        self, published: Mapping[tuple[str, ...], tuple[Address, dict[str, object]]], *, first: bool
-    ) -> bool:
-        """Return whether what never changes is known of all that is told; under the lock."""
-        for at, (address, _) in published.items():
-            known = None if first else self._known.get(at)
-            for name, each in declaration_of(address.kind).state.items():
-                if each.fixed and (known is None or name not in known.fixed):
-                    return False
         return True
 
     def _note_wall(self, wall_s: float) -> None:
@@ -603,25 +520,6 @@ class ApplicationLink:
             before_s, noted_s = self._wall_s
             offset_s = min(offset_s, before_s + _DRIFT * (now_s - noted_s))
         self._wall_s = offset_s, now_s
-
-    def _address(self, at: tuple[str, ...]) -> Address:
-        address, names = self.root, iter(at)
-        for name in names:
-            part = declaration_of(address.kind).parts.get(name)
-            if part is None:
-                raise ProtocolError(f"the state of the unknown part {name[:60]!r} came")
-            address = address.part(name, next(names, "") if part.keyed else None)
-        return address
-
-    def _number(self, at: tuple[str, ...]) -> int:
-        known = self._known.get(at)
-        return known.number if known is not None else 0
-
-    def _differs(self, at: tuple[str, ...], published: tuple[Address, dict[str, object]]) -> bool:
-        known, (address, values) = self._known.get(at), published
-        states = declaration_of(address.kind).state
-        loud = [name for name in values if name not in states or not states[name].quiet]
-        return known is None or any(known.values.get(each) != values[each] for each in loud)
 
     def _on_presence(self, presence: Presence) -> None:
         self._station = presence.name
@@ -712,45 +610,3 @@ def operation_kind(result: Any) -> type[Operation[Any]] | None:
     """Return the kind of operation that a command returns; None where it returns none."""
     kind = get_origin(result) or result
     return kind if isinstance(kind, type) and issubclass(kind, Operation) else None
-
-
-def _fixed(address: Address, values: dict[str, object]) -> dict[str, object]:
-    states = declaration_of(address.kind).state
-    return {name: values[name] for name, each in states.items() if each.fixed}
-
-
-def _flat(
-    address: Address, values: Mapping[str, object]
-) -> Iterator[tuple[tuple[str, ...], tuple[Address, dict[str, object]]]]:
-    """Yield the state of an object and each of its parts, checked; of parts with keys the keys."""
-    own: dict[str, object] = {}
-    for name, part in declaration_of(address.kind).parts.items():
-        inner = values.get(name)
-        if part.optional:
-            own[name] = inner is not None
-            if inner is None:
-                continue
-        if not isinstance(inner, dict):
-            raise ProtocolError(f"state without its part {name} came")
-        if not part.keyed:
-            yield from _flat(address.part(name), inner)
-            continue
-        for key, each in inner.items():
-            if not (isinstance(key, str) and isinstance(each, dict)):
-                raise ProtocolError(f"a broken part {name} came")
-            yield from _flat(address.part(name, key), each)
-        own[name] = tuple(inner)
-    yield address.at, (address, {**own, **_conformed(address, values)})
-
-
-def _conformed(address: Address, values: Mapping[str, object]) -> dict[str, object]:
-    """Return the state of an object, checked; what never changes may be left out."""
-    own: dict[str, object] = {}
-    for name, state in declaration_of(address.kind).state.items():
-        if state.fixed and name not in values:
-            continue
-        try:
-            own[name] = conform(values[name], state.kind)
-        except (KeyError, Mismatch) as exc:
-            raise ProtocolError(f"state of another version came: {name}: {exc}") from exc
-    return own

@@ -16,7 +16,8 @@ from cosmic.frame.arguments import checked
 from cosmic.frame.background import OnResult, do_and_report
 from cosmic.frame.clock import Clock
 from cosmic.frame.declaration import CommandDeclaration, Declared, declaration_of
-from cosmic.frame.network.link import Address, ApplicationLink
+from cosmic.frame.network.known_state import Address
+from cosmic.frame.network.link import ApplicationLink
 from cosmic.frame.threads import may_wait_here
 
 D = TypeVar("D", bound=Declared)
@@ -144,7 +145,7 @@ def _command(original: Callable[..., object], declared: CommandDeclaration) -> o
 
 
 def _state(name: str) -> property:
-    return property(lambda self: self._link.value(self._address, name))
+    return property(lambda self: self._link.state.value(self._address, name, self._link.away))
 
 
 def _stream(name: str) -> object:
@@ -166,7 +167,7 @@ def _newest(of: str) -> property:
 
 def _part(name: str, *, optional: bool) -> property:
     def found(self: Proxied) -> Proxied | None:
-        missing = optional and not self._link.there(self._address, name)
+        missing = optional and not self._link.state.there(self._address, name)
         return None if missing else self._part(name)
 
     return property(found)
@@ -174,6 +175,6 @@ def _part(name: str, *, optional: bool) -> property:
 
 def _parts(name: str) -> property:
     def found(self: Proxied) -> Mapping[str, Proxied]:
-        return {key: self._part(name, key) for key in self._link.keys(self._address, name)}
+        return {key: self._part(name, key) for key in self._link.state.keys(self._address, name)}
 
     return property(found)

@@ -2,13 +2,9 @@
 
 import math
 import secrets
-from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from threading import Lock
-from types import TracebackType
-from typing import Final, Literal, Self, overload
-from weakref import WeakKeyDictionary
+from typing import Literal, overload
 
 from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
@@ -17,32 +13,33 @@ from cosmic.frame.arguments import checked_class
 from cosmic.frame.declaration import Declared, command, state
 from cosmic.frame.errors import (
     CosmicError,
-    MoveCancelled,
     MoveRefused,
     NotAvailable,
     refusal,
 )
-from cosmic.frame.events import Event, notify
+from cosmic.frame.events import notify
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import JOG_LIMIT_S, MOVE_LIMIT_S, current_call
 from cosmic.frame.operation import wait_or_cancel
 from cosmic.frame.threads import may_wait_here
 from cosmic.frame.units import AxisUnit
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.api.axis_ends import OrderBook, RemoteAxisState
 from cosmic.mico.api.axis_shape import AxisMovable, AxisShape, PlanAxis
 from cosmic.mico.api.entry import (
     Number,
     as_number,
     as_whole,
-    caller_token,
     finite,
     one_line,
     source_of,
 )
-from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.group import GroupMovement, LinkedMovement
+from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.news import SentMotion
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.motion.device_commander import DeviceCommander
+from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import (
     Calibrate,
@@ -50,7 +47,6 @@ from cosmic.mico.core.motion.orders import (
     Motion,
     MoveBy,
     MoveTo,
-    Order,
     Reference,
     Steer,
     Step,
@@ -60,168 +56,6 @@ from cosmic.mico.core.motion.positioner import Confidence, PositionerState, Stat
 from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.settings import MicoSettings, PositionerSettings
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
-
-_KEPT: Final = 512
-
-
-class LinkedMovement(Movement):
-    """Ends when all axes have: well at the position of the one that was asked, or badly.
-
-    `parts` has the movement of each axis by name; empty where all were refused.
-    """
-
-    def __init__(self, axis: str) -> None:
-        super().__init__()
-        self._axis = axis
-        self._guarded = Lock()
-        self.parts: Mapping[str, Movement] = {}
-
-    def begin(self, group: GroupMovement) -> None:
-        """Follow `group`; for whoever makes it."""
-        self.parts = group.movements
-        self.on_cancel(group.cancel)
-        for part in self.parts.values():
-            part.add_callback(self._on_part_ended)
-
-    def _on_part_ended(self, _part: Movement) -> None:
-        with self._guarded:
-            if not all(part.done for part in self.parts.values()):
-                return
-        failures = [error for part in self.parts.values() if (error := part.exception())]
-        if failures:
-            causes = (each for each in failures if not isinstance(each, MoveCancelled))
-            self.fail(next(causes, failures[0]))
-        else:
-            self.finish(self.parts[self._axis].wait())
-
-
-class Jogging:
-    """A continuous movement that goes on while it is renewed; made by `Axis.jog`.
-
-    As a context manager it stops at the end of the block.
-    """
-
-    def __init__(
-        self, movement: Movement, renew: Callable[[], object], end: Callable[[], object]
-    ) -> None:
-        self._movement = movement
-        self._renew = renew
-        self._end = end
-
-    @property
-    def movement(self) -> Movement:
-        """The movement; done when the axis stands."""
-        return self._movement
-
-    @property
-    def done(self) -> bool:
-        """True when it has ended: let go, at a limit, stopped or refused."""
-        return self._movement.done
-
-    def renew(self) -> None:
-        """Keep it alive; call it at least every 0.1 s. Any thread."""
-        self._renew()
-
-    def end(self) -> None:
-        """Let go: the axis stops at once."""
-        if not self.done:
-            self._end()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.end()
-
-
-class OrderBook:
-    """The newest orders that other stations gave an axis, by caller and key; any thread."""
-
-    def __init__(self) -> None:
-        self._lock = Lock()
-        self._orders: OrderedDict[tuple[str, str], Order | Movement] = OrderedDict()
-
-    def keep(self, key: str, order: Order | Movement) -> None:
-        """Remember an order under the key that its caller gave it."""
-        with self._lock:
-            self._orders[caller_token(), key] = order
-            while len(self._orders) > _KEPT:
-                self._orders.popitem(last=False)
-
-    def jog(self, key: str) -> Order | None:
-        """Return a jog; None where it was forgotten, or never came."""
-        found = self._orders.get((caller_token(), key))
-        return found if isinstance(found, Order) else None
-
-    def movement(self, key: str) -> Movement:
-        """Return a movement that another one follows.
-
-        Raises
-        ------
-        MoveCancelled
-            It was forgotten long ago: something else came since.
-        """
-        found = self._orders.get((caller_token(), key))
-        if found is None:
-            raise MoveCancelled("a newer command came first")
-        return found.movement if isinstance(found, Order) else found
-
-
-def _unforeseen(_motions: Mapping[str, Motion], _consent: bool) -> MoveVerdict:
-    return refuse(Reason.NO_ANSWER, "no state of the station has arrived yet")
-
-
-class AxisElsewhere:
-    """What is known here of an axis at another station; any thread.
-
-    Attributes
-    ----------
-    platform : callable
-        Returns what the platform file says.
-    foresee : callable
-        Judges motions by what is known here, where nothing may be waited for.
-    changed : Event
-        Tells the state of the axis, whatever of it has changed.
-    keys : mapping of Movement
-        Under which key the station knows a movement.
-    """
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.platform: Callable[[], MicoSettings] = lambda: MicoSettings(positioner=())
-        self.foresee: Callable[[Mapping[str, Motion], bool], MoveVerdict] = _unforeseen
-        self.changed: Event[PositionerState] = Event()
-        self.keys: WeakKeyDictionary[Movement, str] = WeakKeyDictionary()
-        self._newest: tuple[float, float, float] | None = None
-        self._seen: tuple[object, object, str, PositionerState] | None = None
-
-    def move(self, position: float, std: float, read_wall_s: float) -> None:
-        """Take note of where it is."""
-        self._newest = (position, std, read_wall_s)
-
-    def state(self, axis: Declared, published: PositionerState) -> PositionerState:
-        """Return the state that was told last, with the newest position; absent while away."""
-        newest, away, seen = self._newest, axis.away, self._seen
-        if seen is not None and seen[0] is published and seen[1] is newest and seen[2] == away:
-            return seen[3]
-        position, std, read_wall_s = published.position, published.std, published.read_wall_s
-        if newest is not None and newest[2] > read_wall_s:
-            position, std, read_wall_s = newest
-        read_wall_s = axis.wall_s_here(read_wall_s)
-        state = replace(published, position=position, std=std, read_wall_s=read_wall_s)
-        if away:
-            sensed = state.kind is not PositionerKind.OPEN_LOOP
-            confidence = Confidence.UNKNOWN if sensed else state.confidence
-            state = replace(
-                state, present=False, in_motion=False, error=away, confidence=confidence
-            )
-        self._seen = (published, newest, away, state)
-        return state
 
 
 @checked_class
@@ -235,7 +69,7 @@ class Axis(AxisShape, Declared):
 
     commander: DeviceCommander
     """Hears of the axis, and commands it where its device is here."""
-    _far: AxisElsewhere | None = None
+    _far: RemoteAxisState | None = None
 
     def __init__(self, name: str, manager: ManagerPort, commander: DeviceCommander) -> None:
         self._name = name
@@ -250,7 +84,7 @@ class Axis(AxisShape, Declared):
         if not isinstance(policy, FailurePolicy):
             raise TypeError(f"policy must be a FailurePolicy, not {str(policy)[:60]}")
         self._name = key
-        self._far = AxisElsewhere(key)
+        self._far = RemoteAxisState(key)
         self._movable = AxisMovable(self)
 
     @property
@@ -265,7 +99,7 @@ class Axis(AxisShape, Declared):
         return self
 
     @property
-    def far(self) -> AxisElsewhere | None:
+    def far(self) -> RemoteAxisState | None:
         """What is known here where the axis is at another station; None where it is here."""
         return self._far
 

@@ -11,8 +11,9 @@ from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import MoveCancelled
 from cosmic.frame.operation import Operation, Task
 from cosmic.mico.core.motion.group_start import GroupStart
+from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import Motion, Order
+from cosmic.mico.core.motion.orders import Motion
 from cosmic.mico.core.ports import ManagerPort
 
 
@@ -100,6 +101,37 @@ class GroupMovement(Operation[dict[str, float | None]]):
             self.fail(min(failures, key=_importance))
         else:
             self.finish({name: each.result for name, each in self.movements.items()})
+
+
+class LinkedMovement(Movement):
+    """Ends when all axes have: well at the position of the one that was asked, or badly.
+
+    `parts` has the movement of each axis by name; empty where all were refused.
+    """
+
+    def __init__(self, axis: str) -> None:
+        super().__init__()
+        self._axis = axis
+        self._guarded = Lock()
+        self.parts: Mapping[str, Movement] = {}
+
+    def begin(self, group: GroupMovement) -> None:
+        """Follow `group`; for whoever makes it."""
+        self.parts = group.movements
+        self.on_cancel(group.cancel)
+        for part in self.parts.values():
+            part.add_callback(self._on_part_ended)
+
+    def _on_part_ended(self, _part: Movement) -> None:
+        with self._guarded:
+            if not all(part.done for part in self.parts.values()):
+                return
+        failures = [error for part in self.parts.values() if (error := part.exception())]
+        if failures:
+            causes = (each for each in failures if not isinstance(each, MoveCancelled))
+            self.fail(next(causes, failures[0]))
+        else:
+            self.finish(self.parts[self._axis].wait())
 
 
 def move_together(

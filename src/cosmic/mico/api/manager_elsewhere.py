@@ -33,8 +33,9 @@ from cosmic.mico.api.news import (
 from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander
 from cosmic.mico.core.motion.group_start import GroupStart, GroupStarted
 from cosmic.mico.core.motion.lease import Lease
+from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import Jog, Motion, Order
+from cosmic.mico.core.motion.orders import Jog, Motion
 from cosmic.mico.core.motion.positioner import (
     Confidence,
     PositionerBase,

@@ -274,6 +274,8 @@ class Mico(Declared):
 
     def states(self) -> dict[str, PositionerState]:
         """Return the state of every axis by name, in gate coordinates."""
+        if not self.remote:
+            return self._manager.states()  # all at one moment, also while devices are looked for
         return {name: axis.details for name, axis in self.axes.items()}
 
     def positions(self) -> dict[str, float] | None:

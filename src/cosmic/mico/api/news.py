@@ -25,11 +25,10 @@ from cosmic.mico.core.motion.orders import (
     Step,
     ToEndStop,
 )
-from cosmic.mico.core.motion.positioner import PositionerState, class_for
+from cosmic.mico.core.motion.positioner import PositionerState, class_for, positions_of
 from cosmic.mico.core.trajectory_recorder import (
     RecordedBegin,
     RecordedEnd,
-    positions_of,
     resting_of,
 )
 

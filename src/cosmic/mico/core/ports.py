@@ -12,8 +12,9 @@ from cosmic.mico.core.collision.exemptions import Exemptions
 from cosmic.mico.core.motion.device_commander import Commanded, CommanderType, DeviceCommander
 from cosmic.mico.core.motion.lease import Lease
 from cosmic.mico.core.motion.links import LinkTable
+from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import Motion, Order
+from cosmic.mico.core.motion.orders import Motion
 from cosmic.mico.core.motion.positioner import PositionerBase, PositionerState
 from cosmic.mico.core.motion.stop_latch import StopLatch
 from cosmic.mico.core.settings import MicoSettings

@@ -17,7 +17,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.file_names import check_base_name, check_directory
 from cosmic.frame.threads import WorkerThread
 from cosmic.mico.core.motion.messages import MovementBegun
-from cosmic.mico.core.motion.positioner import PositionerState
+from cosmic.mico.core.motion.positioner import PositionerState, positions_of
 from cosmic.mico.core.trajectory.model import Place, Statement, Trajectory
 from cosmic.mico.core.trajectory.reader import END_OF_RECORDING
 from cosmic.mico.core.trajectory.segments import SegmentBuilder
@@ -79,11 +79,6 @@ class Recordable(Protocol):
     @abstractmethod
     def follow_recorded(self, receiver: Callable[[Recorded], object]) -> Callable[[], None]:
         """Call `receiver` with every movement, in order; returns the function that ends it."""
-
-
-def positions_of(states: Mapping[str, PositionerState]) -> dict[str, float]:
-    """Return where the axes are, as far as that is known, in gate coordinates."""
-    return {name: each.position for name, each in states.items() if each.position is not None}
 
 
 def resting_of(states: Mapping[str, PositionerState]) -> frozenset[str]:

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.key_hold import HoldKeys
 from cosmic.frame.units import format_quantity
-from cosmic.mico.api.axis import Jogging
+from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 from cosmic.mico.hw.interface import PositionerKind
 

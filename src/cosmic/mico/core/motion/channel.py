@@ -15,9 +15,9 @@ from cosmic.mico.core.motion.gate import GateQuery
 from cosmic.mico.core.motion.group_start import StartingAxis
 from cosmic.mico.core.motion.jog import SLOWER, JogRun, SteerRun
 from cosmic.mico.core.motion.lease import Guard
-from cosmic.mico.core.motion.messages import CheckedMove, GroupMoveSent
+from cosmic.mico.core.motion.messages import CheckedMove, GroupMoveSent, Order
 from cosmic.mico.core.motion.motion_monitor import ActiveMove, MotionMonitor
-from cosmic.mico.core.motion.orders import Jog, Motion, MoveBy, MoveTo, Order, Reservation, Steer
+from cosmic.mico.core.motion.orders import Jog, Motion, MoveBy, MoveTo, Reservation, Steer
 from cosmic.mico.core.motion.positioner import PositionerBase
 
 logger = logging.getLogger(__name__)
@@ -113,7 +113,7 @@ class ChannelController:
         self._positioner = positioner
         self._context = context
         self.name = positioner.state.name
-        self.speed = ChannelSpeed(positioner, context)
+        self.speed = ChannelSpeed(positioner, context.controller, context.settings.defaults)
         self.monitor = MotionMonitor(positioner, context, self.speed)
         self._starting: tuple[int, JogRun] | None = None
 

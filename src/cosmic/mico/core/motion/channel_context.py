@@ -17,9 +17,9 @@ from cosmic.mico.core.motion.messages import (
     Message,
     MovementBegun,
     MovementEnded,
+    Order,
     PositionChanged,
 )
-from cosmic.mico.core.motion.orders import Order
 from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Controller

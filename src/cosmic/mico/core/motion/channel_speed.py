@@ -6,9 +6,10 @@ from collections.abc import Callable
 from typing import Final
 
 from cosmic.frame.errors import DeviceError, DeviceFault
-from cosmic.mico.core.motion.channel_context import ChannelContext
 from cosmic.mico.core.motion.jog import JogRun, SteerRun
 from cosmic.mico.core.motion.positioner import PositionerBase
+from cosmic.mico.core.settings import MotionDefaults
+from cosmic.mico.hw.interface import Controller
 
 logger = logging.getLogger(__name__)
 
@@ -32,10 +33,13 @@ GLIDE: Final = 1.5
 class ChannelSpeed:
     """Sets the frequency limit of one channel; device thread."""
 
-    def __init__(self, positioner: PositionerBase, context: ChannelContext) -> None:
+    def __init__(
+        self, positioner: PositionerBase, controller: Controller, defaults: MotionDefaults
+    ) -> None:
         self._positioner = positioner
-        self._context = context
-        self._usual_hz = context.settings.defaults.closed_loop_frequency_hz
+        self._controller = controller
+        self._defaults = defaults
+        self._usual_hz = defaults.closed_loop_frequency_hz
 
     def set_usual(self, frequency_hz: int, *, now: bool = True) -> None:
         """Limit the closed-loop speed, from `now` on or from the next movement."""
@@ -69,12 +73,10 @@ class ChannelSpeed:
 
     @property
     def _nominal_step(self) -> float:
-        defaults = self._context.settings.defaults
+        defaults = self._defaults
         rotary = self._positioner.state.unit == "deg"
         return defaults.nominal_step_deg if rotary else defaults.nominal_step_um
 
     def _limit(self, frequency_hz: int) -> None:
         if self._positioner.has_sensor:
-            self._context.controller.set_closed_loop_frequency(
-                self._positioner.state.address, frequency_hz
-            )
+            self._controller.set_closed_loop_frequency(self._positioner.state.address, frequency_hz)

@@ -8,6 +8,7 @@ from PySide6.QtCore import QMetaObject, QObject, Qt, Signal, SignalInstance
 
 from cosmic.frame.errors import NotConnectedError
 from cosmic.frame.units import AxisUnit
+from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import (
     Calibrate,
@@ -15,7 +16,6 @@ from cosmic.mico.core.motion.orders import (
     Motion,
     MoveBy,
     MoveTo,
-    Order,
     Reference,
     Steer,
     Step,

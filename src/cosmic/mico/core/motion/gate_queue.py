@@ -12,8 +12,7 @@ from cosmic.frame.operation import Operation
 from cosmic.frame.threads import JOIN_TIMEOUT_S
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.core.motion.gate import Gate, GateQuery
-from cosmic.mico.core.motion.messages import CheckedMove, GateAnswer, Message, OnChecked
-from cosmic.mico.core.motion.orders import Order
+from cosmic.mico.core.motion.messages import CheckedMove, GateAnswer, Message, OnChecked, Order
 
 GateCheck = Callable[[GateQuery], CheckedMove]
 """Puts a query to the gate and waits for the answer; any thread."""

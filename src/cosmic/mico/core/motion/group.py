@@ -15,8 +15,9 @@ from cosmic.mico.core.motion.gate import Gate
 from cosmic.mico.core.motion.group_start import GroupStart, GroupStarted, LineStart
 from cosmic.mico.core.motion.lease import Lease
 from cosmic.mico.core.motion.links import LinkTable
+from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import FREQUENCY_HZ, Motion, Order, Reservation
+from cosmic.mico.core.motion.orders import FREQUENCY_HZ, Motion, Reservation
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState, class_for
 from cosmic.mico.core.motion.straight import StraightLine, Way
 from cosmic.mico.core.settings import MicoSettings, MotionDefaults

@@ -34,9 +34,9 @@ from cosmic.mico.core.motion.gate import Gate
 from cosmic.mico.core.motion.group import GroupOrders
 from cosmic.mico.core.motion.lease import Lease
 from cosmic.mico.core.motion.links import LinkTable
-from cosmic.mico.core.motion.messages import DeviceLost
+from cosmic.mico.core.motion.messages import DeviceLost, Order
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import Interval, Motion, Order
+from cosmic.mico.core.motion.orders import Interval, Motion
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.core.motion.stop_latch import StopLatch
 from cosmic.mico.core.settings import MicoSettings, WatchSettings

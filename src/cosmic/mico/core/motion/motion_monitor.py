@@ -19,9 +19,9 @@ from cosmic.frame.units import format_quantity
 from cosmic.mico.core.motion.channel_context import ChannelContext
 from cosmic.mico.core.motion.channel_speed import ChannelSpeed, quietly
 from cosmic.mico.core.motion.jog import JogRun
-from cosmic.mico.core.motion.messages import MovementBegun
+from cosmic.mico.core.motion.messages import MovementBegun, Order
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import Jog, Order, Reference, Reservation, Step
+from cosmic.mico.core.motion.orders import Jog, Reference, Reservation, Step
 from cosmic.mico.core.motion.positioner import (
     Confidence,
     CountedTravel,

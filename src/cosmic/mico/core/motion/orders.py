@@ -1,16 +1,10 @@
 """What can be asked of an axis, as frozen data."""
 
 from dataclasses import dataclass
-from itertools import count
-from typing import Final, NamedTuple, Self
+from typing import Final
 
 from cosmic.frame.units import AxisUnit
-from cosmic.mico.core.motion.group_start import GroupStart
-from cosmic.mico.core.motion.lease import Guard
-from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.hw.interface import Capabilities, Direction
-
-_numbers: Final = count(1)
 
 COMMON: Final = Capabilities(group_start=False, velocity=False, position_known=True)
 """What is taken of a controller that has not been asked yet."""
@@ -120,89 +114,3 @@ class Reservation:
     epoch: int
     target: float | None
     straight: bool = False
-
-
-class _OrderFields(NamedTuple):
-    channel: int
-    motion: Motion
-    token: str
-    source: str
-    consent: bool
-    movement: Movement
-    reservation: Reservation | None
-    follows: Movement | None
-    epoch: int | None
-    start: GroupStart | None
-    frequency_hz: int | None
-    guard: Guard | None
-    number: int
-
-
-class Order(_OrderFields):
-    """One command on its way to a `Device`.
-
-    Attributes
-    ----------
-    channel : int
-        Channel of the device it is sent to.
-    motion : Motion
-        What to do.
-    token : str
-        Who sends it (see `Lease`).
-    source : str
-        Where it came from, for the log: "window", "key", "script" ...
-    consent : bool
-        The operator agreed to move an axis whose position is unknown.
-    movement : Movement
-        Completed when the movement ends.
-    reservation : Reservation or None
-        Set where the gate has already decided, together with others.
-    epoch : int or None
-        Number of stops so far when it was submitted; a stop since then makes it void.
-    follows : Movement or None
-        The order is void unless this was the newest on its channel, and nothing was halted since.
-    start : GroupStart or None
-        Others that it starts together with.
-    frequency_hz : int or None
-        Limit of the closed-loop speed for this movement only.
-    guard : Guard or None
-        Ends the movement when it expires; None for what this process commands.
-    """
-
-    __slots__ = ()  # a tuple, for it is made between a command and the call of the library
-
-    def __new__(
-        cls,
-        channel: int,
-        motion: Motion,
-        token: str,
-        source: str = "script",
-        consent: bool = False,
-        *,
-        movement: Movement | None = None,
-        reservation: Reservation | None = None,
-        follows: Movement | None = None,
-        epoch: int | None = None,
-        start: GroupStart | None = None,
-        frequency_hz: int | None = None,
-        guard: Guard | None = None,
-    ) -> Self:
-        """Return an order with a number, and with a movement, of its own."""
-        return tuple.__new__(
-            cls,
-            (
-                channel,
-                motion,
-                token,
-                source,
-                consent,
-                Movement() if movement is None else movement,
-                reservation,
-                follows,
-                epoch,
-                start,
-                frequency_hz,
-                guard,
-                next(_numbers),
-            ),
-        )

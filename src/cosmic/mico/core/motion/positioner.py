@@ -127,6 +127,11 @@ class PositionerState:
         return self.limits[0] - self.zero, self.limits[1] - self.zero
 
 
+def positions_of(states: Mapping[str, PositionerState]) -> dict[str, float]:
+    """Return where the axes are, as far as that is known, in gate coordinates."""
+    return {name: each.position for name, each in states.items() if each.position is not None}
+
+
 class PositionerBase:
     """What every positioner has; one subclass per kind, registered in `POSITIONER_CLASSES`.
 

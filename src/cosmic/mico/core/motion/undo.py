@@ -15,8 +15,8 @@ from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.core.motion.device import Device
 from cosmic.mico.core.motion.manager import DeviceManager
-from cosmic.mico.core.motion.messages import MovementBegun
-from cosmic.mico.core.motion.orders import FREQUENCY_HZ, LARGEST_STEPS, Motion, MoveTo, Order, Step
+from cosmic.mico.core.motion.messages import MovementBegun, Order
+from cosmic.mico.core.motion.orders import FREQUENCY_HZ, LARGEST_STEPS, Motion, MoveTo, Step
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.hw.interface import PositionerKind
 

@@ -7,7 +7,7 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.jog import HandLostError
-from cosmic.mico.core.motion.orders import Order
+from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.core.teleoperation.settings import TeleoperationSettings
 from cosmic.mico.core.teleoperation.state import RateMeter
 

@@ -1,0 +1,51 @@
+"""`Jogging`: a continuous movement in the hands of whoever renews it."""
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from cosmic.mico.core.motion.movement import Movement
+
+
+class Jogging:
+    """A continuous movement that goes on while it is renewed; made by `Axis.jog`.
+
+    As a context manager it stops at the end of the block.
+    """
+
+    def __init__(
+        self, movement: Movement, renew: Callable[[], object], end: Callable[[], object]
+    ) -> None:
+        self._movement = movement
+        self._renew = renew
+        self._end = end
+
+    @property
+    def movement(self) -> Movement:
+        """The movement; done when the axis stands."""
+        return self._movement
+
+    @property
+    def done(self) -> bool:
+        """True when it has ended: let go, at a limit, stopped or refused."""
+        return self._movement.done
+
+    def renew(self) -> None:
+        """Keep it alive; call it at least every 0.1 s. Any thread."""
+        self._renew()
+
+    def end(self) -> None:
+        """Let go: the axis stops at once."""
+        if not self.done:
+            self._end()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.end()
