@@ -98,7 +98,7 @@ class KnownState:
             return known.values[name]
         unknown = declaration_of(address.kind).state[name].unknown
         if unknown is UNKNOWN:
-            raise StationAway(f"{name} is not known: {away or 'it was not on_result yet'}")
+            raise StationAway(f"{name} is not known: {away or 'nothing was published yet'}")
         return unknown
 
     def keys(self, address: Address, name: str) -> tuple[str, ...]:
