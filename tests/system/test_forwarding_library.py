@@ -41,7 +41,7 @@ def test_a_program_that_knows_the_header_alone_moves_a_simulated_stage(
     make: str, tmp_path: Path
 ) -> None:
     environment = os.environ | {"PYTHONPATH": str(SRC)}
-    command = [sys.executable, "-m", "cosmic.mico.hw.forwarding", make, "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "cosmic", "simulate", "library", make, "--out", str(tmp_path)]
     built = subprocess.run(
         [*command, "--layout", "LLL,RNN", "--rate", "50"],
         env=environment,

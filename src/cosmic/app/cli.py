@@ -162,6 +162,14 @@ def _add_simulate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]
     scu.add_argument("--baud", type=int, default=9600, help="speed of the line")
     scu.add_argument("--cold", action="store_true", help="just switched on: nothing is referenced")
     scu.add_argument("--seconds", type=float, default=None, help="end after so long")
+    library = kinds.add_parser(
+        "library", help="a shared library in the place of a vendor's, for programs in any language"
+    )
+    library.add_argument("make", choices=("scu3d", "smaractctl"), help="whose place it takes")
+    library.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="where")
+    library.add_argument("--layout", default="LLL,LLL,LLN,RNN", help="stages of each device")
+    library.add_argument("--rate", type=float, default=1.0, help="simulated seconds a second")
+    library.add_argument("--seed", type=int, default=0, help="seed of the simulation")
 
 
 def _add_station_commands(

@@ -178,3 +178,28 @@ def test_without_qt_libraries_it_says_what_qt_says(
     assert code == 1
     assert finding(said, "Qt")["state"] == "problem"
     assert "no-such-plugin" in finding(said, "Qt")["found"]
+
+
+def test_both_libraries_of_smaract_are_looked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    _, said = page(capsys)
+    for library, file in (("scu3d", "scu3d"), ("smaractctl", "smaractctl")):
+        assert file in finding(said, library)["advice"].lower()
+        assert finding(said, library)["state"] == "note"
+
+
+def test_what_a_platform_file_names_and_nobody_brings_is_a_problem(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "config"
+    assert main(["init", str(folder)]) == 0
+    file = folder / "platform.toml"
+    text = file.read_text(encoding="utf-8")
+    text = text.replace('[daqco]\nbackend = "simulated"', '[daqco]\nbackend = "their_board"', 1)
+    text = text.replace("[platform]\n", '[platform]\nrequires = ["their-package>=1"]\n', 1)
+    file.write_text(text, encoding="utf-8")
+    capsys.readouterr()
+    assert main(["doctor", "--config", str(folder)]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert "!! their-package>=1 not installed" in said
+    assert "!! their_board acquisition board their_board: not there" in said
+    assert "there is no acquisition board 'their_board'" in said

@@ -13,7 +13,7 @@ from cosmic import __version__
 from cosmic.app.configuration.platform_file import PlatformFile, load_platform
 from cosmic.app.diagnosis import computer
 from cosmic.app.diagnosis.finding import Check, Finding, State, carry_out
-from cosmic.app.diagnosis.hardware import hardware, network, serial_ports
+from cosmic.app.diagnosis.hardware import brought, hardware, network, serial_ports
 
 _MARKS: Final = {State.GOOD: "ok", State.NOTE: "--", State.PROBLEM: "!!"}
 _WIDTH: Final = 100
@@ -49,6 +49,7 @@ def examine(file: PlatformFile) -> list[Finding]:
     checks: tuple[tuple[str, str, Check, bool], ...] = (
         ("Python", "Python", computer.python, True),
         ("Packages", "packages", computer.packages, False),
+        ("Packages", "brought", partial(brought, file), True),
         ("Windows", "Qt", computer.windows, True),
         ("Vendors' libraries", "libraries", partial(hardware, file), False),
         ("Ports", "serial ports", partial(serial_ports, file), False),

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from cosmic.frame.clock import WALL, RatedClock
 from cosmic.frame.errors import ArgumentError
+from cosmic.mico.hw.forwarding import build
 from cosmic.mico.hw.scu_serial import open_serial_port
 from cosmic.mico.hw.sim_scu_pty import End, PortEnd, PseudoTerminal, serve
 from cosmic.mico.hw.sim_scu_serial import SimulatedScus
@@ -18,7 +19,27 @@ from cosmic.twin.settings import shipped_settings
 
 
 def run(chosen: argparse.Namespace) -> int:
-    """Serve until interrupted, or for as long as was asked; returns 0."""
+    """Carry out what the command line says; returns 0.
+
+    Raises
+    ------
+    ArgumentError
+        What was asked for does not fit together.
+    NotAvailable
+        A library cannot be built here.
+    """
+    return _library(chosen) if chosen.device == "library" else _scu_serial(chosen)
+
+
+def _library(chosen: argparse.Namespace) -> int:
+    """Build a shared library that forwards to the simulation, and say where it is."""
+    built = build(chosen.make, chosen.out, layout=chosen.layout, rate=chosen.rate, seed=chosen.seed)
+    sys.stdout.write(f"{built}\n")
+    return 0
+
+
+def _scu_serial(chosen: argparse.Namespace) -> int:
+    """Serve until interrupted, or for as long as was asked."""
     links: list[Path] = chosen.link
     ports: list[str] = chosen.port
     if not (links or ports):

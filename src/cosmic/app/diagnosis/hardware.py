@@ -5,17 +5,31 @@ import socket
 import sys
 from collections.abc import Iterator
 from contextlib import closing
+from functools import partial
 
+from cosmic.app.configuration.backends import named_backends
 from cosmic.app.configuration.platform_file import PlatformFile
 from cosmic.app.diagnosis.finding import Finding, State, carry_out, missing
 from cosmic.daqco.hw.factory import make_library
-from cosmic.frame.plugins import Kind, names
+from cosmic.frame.errors import ConfigError
+from cosmic.frame.plugins import (
+    Kind,
+    find_backend,
+    is_simulated,
+    missing_packages,
+    names,
+    plugins,
+)
+from cosmic.mico.core.settings import ControllerSettings, MicoSettings
 from cosmic.mico.hw.factory import make_controller
 from cosmic.mico.hw.sdl_input import SdlSource
 from cosmic.vico.hw.factory import make_camera_library
 from cosmic.vico.hw.serial_port import list_ports
 
 LIBRARIES = "Vendors' libraries"
+PACKAGES = "Packages"
+_LIBRARIES_OF_CONTROLLERS = ("scu3d", "smaractctl")
+"""Looked for in any case: what else there is of controllers, only a platform file tells."""
 PORTS = "Ports"
 
 
@@ -23,9 +37,7 @@ def hardware(file: PlatformFile) -> list[Finding]:
     """Look for every library and its devices; what the platform file names is needed."""
     cameras = {each.backend for each in file.vico.camera} if file.vico else set()
     boards = {each.backend for each in file.daqco.drivers} if file.daqco is not None else set()
-    found = carry_out(
-        LIBRARIES, "scu3d", lambda: _controllers(file), needed=file.mico.backend == "scu3d"
-    )
+    found = _controllers(file)
     for backend in names(Kind.BOARD):
         if backend != "simulated":
             found += _boards(backend, needed=backend in boards)
@@ -36,14 +48,53 @@ def hardware(file: PlatformFile) -> list[Finding]:
     return found
 
 
-def _controllers(file: PlatformFile) -> Iterator[Finding]:
-    with closing(make_controller("scu3d", library_path=file.mico.library)) as controller:
+def _controllers(file: PlatformFile) -> list[Finding]:
+    """Look for the libraries of SmarAct, and for whatever controller the platform file names."""
+    found: list[Finding] = []
+    named = {each.backend: each for each in file.mico.controllers}
+    for backend in dict.fromkeys((*_LIBRARIES_OF_CONTROLLERS, *named)):
+        settings = named.get(backend)
+        if settings is None or not is_simulated(Kind.CONTROLLER, backend):
+            look = partial(_controller, backend, settings)
+            found += carry_out(LIBRARIES, backend, look, needed=settings is not None)
+    return found
+
+
+def _controller(
+    backend: str, settings: MicoSettings | ControllerSettings | None
+) -> Iterator[Finding]:
+    path = "" if settings is None else settings.library
+    made = make_controller(
+        backend,
+        library_path=path,
+        serials=() if settings is None else settings.serials,
+        options={} if settings is None else settings.options,
+    )
+    with closing(made) as controller:
         serials = ", ".join(str(each) for each in controller.find_devices())
-        where = file.mico.library or "from where the system looks"
-        found = f"{controller.name}, {where}; devices: {serials or 'none'}"
-    advice = "" if serials else "Switch the controllers on and look at their USB cables."
-    state = State.GOOD if serials else missing(needed=file.mico.backend == "scu3d")
-    yield Finding(LIBRARIES, "scu3d", state, found, advice)
+        where = f", {path or 'from where the system looks'}"
+        where = where if backend in _LIBRARIES_OF_CONTROLLERS else ""
+        found = f"{controller.name}{where}; devices: {serials or 'none'}"
+    advice = "" if serials else "Switch the controllers on and look at their cables."
+    state = State.GOOD if serials else missing(needed=settings is not None)
+    yield Finding(LIBRARIES, backend, state, found, advice)
+
+
+def brought(file: PlatformFile) -> Iterator[Finding]:
+    """Look whether what the platform file names from other packages is there, and loads."""
+    for each in missing_packages(file.platform.requires):
+        yield Finding(PACKAGES, each, State.PROBLEM, "not installed", f"pip install '{each}'")
+    for named in named_backends(file):
+        packages = [each for each in plugins(named.kind) if each.name == named.name]
+        if packages and all(each.package.startswith("cosmic ") for each in packages):
+            continue
+        what = f"{named.kind.word} {named.name}"
+        try:
+            find_backend(named.kind, named.name)
+        except ConfigError as exc:
+            yield Finding(PACKAGES, named.name, State.PROBLEM, f"{what}: not there", str(exc))
+        else:
+            yield Finding(PACKAGES, named.name, State.GOOD, f"{what}, of {packages[0].package}")
 
 
 def _boards(backend: str, *, needed: bool) -> list[Finding]:
