@@ -744,6 +744,45 @@ class Axis(AxisShape, Declared):
             raise refusal(refuse(Reason.WRONG_KIND, text, axis=self._name))
         self.limit_frequency(as_whole(frequency_hz, "Hz", self._name))
 
+    def set_sensor_type(self, code: int, *, consent: bool = False) -> None:
+        """Store in the controller which positioner is connected, by the vendor's number.
+
+        Afterwards the position is unknown: press Rescan, then calibrate and reference it.
+
+        Parameters
+        ----------
+        consent : bool
+            The operator agreed: a wrong type makes every position wrong.
+
+        Raises
+        ------
+        NotAvailable
+            Nobody agreed, it is moving, or it is at another station.
+        DeviceError
+            The controller refuses.
+        """
+        self._set_up(as_whole(code, "", self._name), consent=consent)
+
+    def set_safe_direction(self, direction: Direction | str, *, consent: bool = False) -> None:
+        """Store in the controller where a search for the reference begins.
+
+        Afterwards the position is unknown: calibrate and reference it.
+
+        Parameters, Raises
+        ------------------
+        As `set_sensor_type`.
+        """
+        self._set_up(Direction(direction), consent=consent)
+
+    def _set_up(self, change: int | Direction, *, consent: bool) -> None:
+        if not consent:
+            raise NotAvailable(
+                f"{self._name}: this changes what the controller stores, and where the axis goes "
+                "to be referenced; say consent=True when nothing is in its way"
+            )
+        device = self._manager.device(self._name)
+        device.set_up(self._channel, change).wait(self._manager.settings.watch.answer_s)
+
     @command(moves=True, aside=True)
     def limit_frequency(self, frequency_hz: int) -> None:
         """Limit the speed of movements to a position; raises as `set_closed_loop_frequency`."""

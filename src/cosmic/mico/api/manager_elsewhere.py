@@ -11,7 +11,7 @@ from cosmic.frame.background import BackgroundJobs
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable, UnknownAxisError, refusal
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.operation import Operation
+from cosmic.frame.operation import Operation, Task
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.group import GroupMovement
@@ -44,7 +44,7 @@ from cosmic.mico.core.motion.positioner import (
 )
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.state_news import StateNews
-from cosmic.mico.hw.interface import Channel
+from cosmic.mico.hw.interface import Channel, Direction
 
 
 class Queues:
@@ -186,6 +186,12 @@ class DeviceElsewhere(QObject):
     def set_estimate(self, channel: int, position: float, std: float) -> None:
         """Say where an axis without sensor stands; see `Device.set_estimate`."""
         self.axis(channel).place_at(position, std)
+
+    def set_up(self, channel: int, change: int | Direction) -> Task:
+        """Store what is connected; see `Device.set_up`."""
+        done = Task(f"setting up channel {channel}: {change}")
+        done.fail(NotAvailable("positioners are set up at the station that has them"))
+        return done
 
 
 class CommanderSlots(QObject):

@@ -7,6 +7,7 @@ from typing import Protocol
 from PySide6.QtCore import SignalInstance
 
 from cosmic.frame.clock import Clock
+from cosmic.frame.operation import Task
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.core.collision.exemptions import Exemptions
 from cosmic.mico.core.motion.device_commander import Commanded, CommanderType, DeviceCommander
@@ -18,7 +19,7 @@ from cosmic.mico.core.motion.orders import Motion
 from cosmic.mico.core.motion.positioner import PositionerBase, PositionerState
 from cosmic.mico.core.motion.stop_latch import StopLatch
 from cosmic.mico.core.settings import MicoSettings
-from cosmic.mico.hw.interface import Channel
+from cosmic.mico.hw.interface import Channel, Direction
 
 
 class PositionersPort(Protocol):
@@ -49,6 +50,10 @@ class DevicePort(Commanded, Protocol):
     @abstractmethod
     def set_estimate(self, channel: int, position: float, std: float) -> None:
         """Say where an axis without sensor stands; see `Device.set_estimate`."""
+
+    @abstractmethod
+    def set_up(self, channel: int, change: int | Direction) -> Task:
+        """Begin to store a positioner type or a safe direction; see `Device.set_up`."""
 
 
 class ControllerPort(Protocol):

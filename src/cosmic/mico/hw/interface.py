@@ -385,6 +385,14 @@ class Controller(Protocol):
         """Set speed and acceleration of the movements to come; needs `Capabilities.velocity`."""
         raise _unsupported(channel, f"a speed of {speed} {unit}/s, {acceleration} {unit}/s2")
 
+    def set_sensor_type(self, channel: Channel, code: int) -> None:
+        """Say which positioner is connected, by the vendor's number; it is uncalibrated then."""
+        raise _unsupported(channel, f"setting of a sensor type {code}")
+
+    def set_safe_direction(self, channel: Channel, direction: Direction) -> None:
+        """Say where a search for the reference begins; a new one needs a new calibration."""
+        raise _unsupported(channel, f"setting of a safe direction, {direction}")
+
     def move_together(self, moves: Sequence[MatchedMove]) -> None:
         """Start movements of one device by one command, all or none.
 

@@ -220,6 +220,14 @@ class JoinedController(Controller):
         self._at(channel, lambda to, at: to.move_to_end_stop(at, direction, hold_s=hold_s))
 
     @override
+    def set_sensor_type(self, channel: Channel, code: int) -> None:
+        self._at(channel, lambda to, at: to.set_sensor_type(at, code))
+
+    @override
+    def set_safe_direction(self, channel: Channel, direction: Direction) -> None:
+        self._at(channel, lambda to, at: to.set_safe_direction(at, direction))
+
+    @override
     def stop(self, channel: Channel) -> None:
         self._at(channel, lambda to, at: to.stop(at))
 

@@ -215,6 +215,14 @@ class Scu3dController(Controller):
         )
 
     @override
+    def set_sensor_type(self, channel: Channel, code: int) -> None:
+        self._send(channel, "SA_SetSensorType_A", convert.index(code, "sensor type"))
+
+    @override
+    def set_safe_direction(self, channel: Channel, direction: Direction) -> None:
+        self._send(channel, "SA_SetSafeDirection_A", _DIRECTIONS[direction])
+
+    @override
     def stop(self, channel: Channel) -> None:
         self._send(channel, "SA_Stop_A")
 

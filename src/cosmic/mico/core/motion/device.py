@@ -17,6 +17,7 @@ from cosmic.frame.errors import (
     DeviceFault,
     DeviceTimeout,
     MoveCancelled,
+    NotAvailable,
     NotConnectedError,
     refusal,
 )
@@ -40,14 +41,16 @@ from cosmic.mico.core.motion.messages import (
     Order,
     PublishState,
     SetFrequency,
+    SetUp,
     StopAll,
     Wake,
 )
-from cosmic.mico.core.motion.positioner import CountedTravel, PositionerState
+from cosmic.mico.core.motion.positioner import Confidence, CountedTravel, PositionerState
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import (
     Channel,
     Controller,
+    Direction,
     Event,
     Failed,
     PositionerKind,
@@ -344,6 +347,17 @@ class Device(WorkerThread):
         self.container.set_estimate(channel, travel, position, std)
         self._inbox.put(PublishState(channel))
 
+    def set_up(self, channel: int, change: int | Direction) -> Task:
+        """Begin to store a positioner type or a safe direction in the controller.
+
+        The task fails with `NotAvailable` while the axis moves, and with `DeviceError` where the
+        controller refuses. Afterwards the axis has to be calibrated and referenced; after a new
+        type it is away until the devices are searched again.
+        """
+        done = Task(f"setting up device {self.index} channel {channel}")
+        self._inbox.put(SetUp(channel, change, done))
+        return done
+
     def wait_until_discovered(self, timeout_s: float) -> bool:
         """Wait until types and positions are known; False after `timeout_s` of wall time."""
         return self._discovery.wait(timeout_s)
@@ -431,6 +445,8 @@ class Device(WorkerThread):
                 self._on_lost(message.error)
             case Halt() | SetFrequency():
                 self._on_channel_message(message)
+            case SetUp():
+                self._on_set_up(message)
             case Wake():
                 self._nudged = False
             case PublishState():
@@ -463,6 +479,38 @@ class Device(WorkerThread):
                 axis.monitor.halt(message.error)
         else:
             axis.set_frequency(message.frequency_hz)
+
+    def _on_set_up(self, message: SetUp) -> None:
+        """Store it while the axis is stationary, and say what has to be done then."""
+        container, controller = self.container, self._context.controller
+        axis, state = self._channels.get(message.channel), container.state(message.channel)
+        if axis is None or state is None or not state.present:
+            where = f"device {self.index} channel {message.channel}"
+            message.done.fail(NotAvailable(f"{where}: there is no axis to set up"))
+            return
+        asked = any(each.channel == message.channel for each in self._queries.orders)
+        reserved = asked or state.name in self._context.gate.held()
+        moving = axis.monitor.active is not None or state.in_motion or not state.activity.at_rest
+        if reserved or moving:
+            text = f"{state.name}: it is moving; set it up when it is stationary"
+            message.done.fail(NotAvailable(text))
+            return
+        address = container.address(message.channel)
+        try:
+            if isinstance(message.change, Direction):
+                controller.set_safe_direction(address, message.change)
+                container.update(message.channel, safe_direction=message.change)
+            else:
+                controller.set_sensor_type(address, message.change)
+                text = f"type {message.change} was set: press Rescan, then calibrate and reference"
+                container.update(message.channel, present=False, error=text)
+        except DeviceError as exc:
+            message.done.fail(exc)
+            return
+        container.update(message.channel, confidence=Confidence.UNKNOWN)
+        logger.warning("%s: set up anew: %s", state.name, message.change)
+        self._context.reports.state(message.channel)
+        message.done.finish()
 
     def _on_order(self, order: Order) -> None:
         axis = self._channels.get(order.channel)

@@ -6,6 +6,7 @@ from itertools import count
 from typing import Final, NamedTuple, Self
 
 from cosmic.frame.errors import CosmicError, DeviceError
+from cosmic.frame.operation import Task
 from cosmic.frame.units import AxisUnit
 from cosmic.frame.verdict import ALLOWED, MoveVerdict
 from cosmic.mico.core.motion.group_start import GroupStart
@@ -13,7 +14,7 @@ from cosmic.mico.core.motion.jog import JogRun
 from cosmic.mico.core.motion.lease import Guard
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import Motion, Reservation
-from cosmic.mico.hw.interface import Event
+from cosmic.mico.hw.interface import Direction, Event
 
 _numbers: Final = count(1)
 
@@ -225,6 +226,21 @@ class SetFrequency:
 
 
 @dataclass(frozen=True, slots=True)
+class SetUp:
+    """Store in the controller what is connected to a channel; the task ends when that is done.
+
+    Attributes
+    ----------
+    change : int or Direction
+        The vendor's number of the positioner type, or where a search for the reference begins.
+    """
+
+    channel: int
+    change: int | Direction
+    done: Task
+
+
+@dataclass(frozen=True, slots=True)
 class Wake:
     """Nothing but a reason to look whether the thread shall end."""
 
@@ -253,6 +269,7 @@ Message = (
     | StopAll
     | Lost
     | SetFrequency
+    | SetUp
     | PublishState
     | Wake
 )
