@@ -152,13 +152,14 @@ class ChannelController:
             reservation = None
         if reservation is not None:
             self._go(order, reservation)
-        elif self._has_origin(order):
+        elif not isinstance(order.motion, MoveBy) or self._has_origin(order):
             self._ask_gate(order)
 
     def _ask_gate(self, order: Order) -> None:
         """Begin `order` where the gate answers at once; otherwise go on, and begin it later."""
         motion = order.motion
-        decided = self._context.gate.decide_promptly([_request(self.name, order, motion)])
+        request = Request(self.name, motion, order.token, order.consent, guard=order.guard)
+        decided = self._context.gate.decide_promptly([request])
         if decided is None:
             self._context.queries.ask(order, partial(self._ask, order, motion), self._on_checked)
             return
@@ -262,12 +263,12 @@ class ChannelController:
         self.monitor.ask_activity()
 
     def _has_origin(self, order: Order) -> bool:
-        """See whether it is known where `order` goes from; otherwise it is refused."""
+        """See whether it is known where a distance starts; otherwise `order` is refused."""
         active = self.monitor.active
         nowhere = active is not None and (
             active.error is not None or active.reservation.target is None
         )
-        if nowhere and isinstance(order.motion, MoveBy) and order.reservation is None:
+        if nowhere and order.reservation is None:
             text = (
                 f"{self.name}: it is still moving, so a distance has no start. "
                 "Wait until it is stationary"

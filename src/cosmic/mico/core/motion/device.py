@@ -250,8 +250,8 @@ class Device(WorkerThread):
     def submit(self, order: Order) -> None:
         """Queue `order`; how it goes is reported by its movement and by signals."""
         stop = self._context.gate.stop_state
-        if stop.latched:
-            self._refuse_stopped(order, stop.reason or "")
+        if stop.reason is not None:
+            self._refuse_stopped(order, stop.reason)
             return
         # First, for the device thread cannot begin before this one lets it. Cancelled in between,
         # the order finds that out before it is sent.
@@ -513,7 +513,7 @@ class Device(WorkerThread):
         message.done.finish()
 
     def _on_order(self, order: Order) -> None:
-        axis = self._channels.get(order.channel)
+        axis = self._discovery.channels.get(order.channel)
         if axis is None or not self._discovery.over:
             self._turn_away(order, None)
             return

@@ -248,7 +248,7 @@ class Gate:
     def still_valid(self, reservation: Reservation) -> bool:
         """Return False when a stop came after `reservation`; takes no lock."""
         state = self._latch.state
-        return not state.latched and state.epoch == reservation.epoch
+        return state.reason is None and state.epoch == reservation.epoch
 
     # Reservations
 
