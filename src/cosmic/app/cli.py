@@ -119,6 +119,12 @@ def _add_file_commands(
         "--output", type=Path, metavar="FILE", help="output file (default: beside the recording)"
     )
     export.add_argument("--overwrite", action="store_true", help="replace a file that exists")
+    setup = commands.add_parser(
+        "setup", help="turn axes that are found and not configured into entries of the files"
+    )
+    setup.add_argument("--config", type=Path, default=None, metavar="PATH", help=_CONFIG)
+    setup.add_argument("--move", action="store_true", help="offer to move each a little")
+    setup.add_argument("--write", action="store_true", help="add the entries; comments are kept")
     device = commands.add_parser(
         "new-device", help="write a package that brings a device or a method, to change it"
     )
