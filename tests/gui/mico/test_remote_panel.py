@@ -3,9 +3,11 @@
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from pathlib import Path
 
+import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QPushButton
+from PySide6.QtWidgets import QLabel, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
 from contract.mico_rig import HostedMico, hosted_mico, reachable
@@ -17,11 +19,14 @@ from cosmic.frame.network.client_side_connection import ClientSideConnection
 from cosmic.frame.threads import declare_gui_thread
 from cosmic.mico.api.elsewhere import MicoElsewhere
 from cosmic.mico.api.stepwise import StepwiseMove
+from cosmic.mico.api.trajectory_state import PlayState
 from cosmic.mico.gui.mico_widget import MicoWidget, make_mico_gui
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
-from gui.mico.panels import click, enter, field, show, wait_for_position
+from cosmic.mico.gui.trajectory_panel import TrajectoryPanel, make_trajectory_panel
+from gui.mico.panels import click, enter, field, part, show, wait_for_position
 
 LONG_MS = 10_000
+HEAD = "cosmic-trajectory 1\nplatform FiberStation\n"
 
 
 @contextmanager
@@ -151,3 +156,51 @@ def test_a_station_that_goes_away_greys_the_panel_and_comes_back_by_itself(qtbot
             hosted.mico["left.x"].move_to(40.0, wait=False)
             wait_for_position(qtbot, card, 40.0)
             qtbot.waitUntil(lambda: not missing.isVisible(), timeout=LONG_MS)
+
+
+def test_a_trajectory_and_a_pose_of_another_station_are_run_from_its_window(
+    qtbot: QtBot, tmp_path: Path
+) -> None:
+    with (
+        hosting() as hosted,
+        reachable(hosted),
+        remote_panel(qtbot, hosted) as (widget, _),
+    ):
+        panel = make_trajectory_panel(widget.mico)
+        qtbot.addWidget(panel)
+        show(qtbot, panel, 620, 700)
+        path = tmp_path / "some.trajectory"
+        path.write_text(f"{HEAD}start left.y 40 um\nleft.y by 60 um\nleft.y by -20 um\n")
+        panel.open(path)
+        qtbot.waitUntil(lambda: panel.trajectory is not None, timeout=LONG_MS)
+        click(qtbot, panel, "rehearse")
+        qtbot.waitUntil(lambda: "smallest clearance" in panel.report.text(), timeout=LONG_MS)
+
+        click(qtbot, panel, "step")
+        qtbot.waitUntil(panel.question.isVisible, timeout=LONG_MS)
+        click(qtbot, panel, "goStraight")
+        reached(qtbot, panel, PlayState.PAUSED)
+        assert hosted.mico["left.y"].position_um == pytest.approx(100.0, abs=1.0)
+        click(qtbot, panel, "runTrajectory")
+        reached(qtbot, panel, PlayState.ENDED)
+        assert hosted.mico["left.y"].position_um == pytest.approx(80.0, abs=1.0)
+        assert panel.report.text().startswith("done.")
+
+        box = panel.poses_box
+        qtbot.keyClicks(part(box, "poseName", QLineEdit), "here")
+        click(qtbot, box, "teachPose")
+        qtbot.waitUntil(lambda: "axes" in box.message.text(), timeout=LONG_MS)
+        click(qtbot, box, "goPose")
+        qtbot.waitUntil(lambda: box.message.text() == "there", timeout=LONG_MS)
+        hosted.station.lease.take_over()
+        click(qtbot, box, "goPose")
+        qtbot.waitUntil(lambda: "right to move" in box.message.text(), timeout=LONG_MS)
+        click(qtbot, panel, "runTrajectory")
+        qtbot.waitUntil(lambda: "right to move" in panel.report.text(), timeout=LONG_MS)
+
+
+def reached(qtbot: QtBot, panel: TrajectoryPanel, state: PlayState) -> None:
+    qtbot.waitUntil(
+        lambda: panel.player is not None and panel.player.state is state, timeout=LONG_MS
+    )
+    qtbot.waitUntil(lambda: str(state) in panel.run_bar.left.text(), timeout=LONG_MS)

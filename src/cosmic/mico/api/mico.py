@@ -213,6 +213,7 @@ class Mico(Declared):
         if name not in self._axes:
             device = self._manager.address(name).device
             if device not in self._commanders:
+                self._manager.device(name)  # there with the first axis, whoever asks for it first
                 self._connect()
             axis.commander = self._commanders[device]
             if axis.far is not None:
