@@ -7,6 +7,7 @@ import pytest
 import tomlkit
 
 import cosmic
+from cosmic.app.cli import main
 from cosmic.frame.config import shipped_config_dir
 from cosmic.vico.core.image import CameraImage
 
@@ -58,3 +59,25 @@ def test_image_times_agree_with_sample_numbers_within_one_sample(
             assert sample % (RATE_HZ / IMAGES_HZ) == 0
             assert exposures[sample].time_s == pytest.approx(sample_s, abs=1e-6)
             assert abs(image.frame.exposed_s - sample_s) < 1.0 / RATE_HZ
+
+
+def test_a_trigger_for_a_camera_that_is_not_there_or_runs_free_is_a_mistake(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_platform(tmp_path, camera="telescope")
+    assert main(["check", str(path)]) == 1
+    assert "daqco.camera_trigger.camera: there is no camera 'telescope'" in capsys.readouterr().err
+    text = write_platform(tmp_path).read_text(encoding="utf-8")
+    path.write_text(text.replace('trigger = "hardware"', ""), encoding="utf-8")
+    assert main(["check", str(path)]) == 1
+    assert 'give microscope trigger = "hardware"' in capsys.readouterr().err
+
+
+def test_a_trigger_that_is_too_fast_for_the_samples_is_told_with_what_is_possible(
+    tmp_path: Path,
+) -> None:
+    path = write_platform(tmp_path, rate_hz=400.0)
+    with cosmic.connect(path, applications=("daqco",), rate=10.0) as rig:
+        assert "camera_trigger: 400 Hz asked; at 1000 samples a second up to 250 Hz" in (
+            rig.daqco.problem
+        )

@@ -22,8 +22,10 @@ def misnamed(file: PlatformFile, path: Path, applications: Collection[str]) -> l
     """
     kinds = file.mico.kinds
     lines: list[str] = []
+    if {"daqco", "vico"} <= set(applications):
+        lines += _trigger_mistakes(file)
     if "mico" not in applications:
-        return lines
+        return [f"{path}: {each}" for each in lines]
     if file.vico is not None and "vico" in applications:
         lines += tool_mistakes(file.vico.tool, kinds)
         lines += _table_mistakes(file.vico, kinds)
@@ -34,6 +36,20 @@ def misnamed(file: PlatformFile, path: Path, applications: Collection[str]) -> l
             text = not_there("channel", wanted, channels)
             lines.append(f"mico.teleoperation.force_channel: {text}")
     return [f"{path}: {each}" for each in lines]
+
+
+def _trigger_mistakes(file: PlatformFile) -> list[str]:
+    """Return what is wrong with the camera that the sample clock triggers."""
+    trigger = file.daqco.camera_trigger if file.daqco is not None else None
+    if trigger is None or file.vico is None:
+        return []
+    cameras = {each.name: each for each in file.vico.camera}
+    camera = cameras.get(trigger.camera)
+    if camera is None:
+        return [f"daqco.camera_trigger.camera: {not_there('camera', trigger.camera, cameras)}"]
+    if camera.trigger != "hardware":
+        return [f'daqco.camera_trigger.camera: give {camera.name} trigger = "hardware"']
+    return []
 
 
 def _table_mistakes(vico: VicoSettings, kinds: dict[str, str]) -> list[str]:

@@ -76,6 +76,7 @@ class Proxied(Declared):
         return self._link.wall_s_here(wall_s)
 
     @override
+    @checked
     def carry_out(
         self, action: Callable[[], T], on_result: OnResult[T], *, slow: bool = False
     ) -> None:
