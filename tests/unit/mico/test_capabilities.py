@@ -46,3 +46,11 @@ def test_steps_are_refused_beyond_what_this_controller_takes():
         for asked in ({"steps": 100_001}, {"amplitude_v": 0.5}, {"frequency_hz": 20_001}):
             with pytest.raises(cosmic.LimitError):
                 rig["d0.c1"].steps(**{"steps": 1, **asked})
+
+
+def test_what_a_trajectory_may_ask_for_is_what_the_controller_takes():
+    with mico(("LN",), prepare=able) as (rig, _):
+        facts = rig.facts().axes["d0.c1"]
+        assert facts.most_steps == ABLE.most_steps
+        assert facts.frequency_hz == ABLE.frequency_hz
+        assert facts.amplitude_v == ABLE.amplitude_v

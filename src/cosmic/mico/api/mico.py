@@ -755,6 +755,9 @@ class Mico(Declared):
                 unit=each.unit,
                 has_sensor=class_for(each.kind, each.positioner).has_sensor,
                 limits=each.limits,
+                most_steps=each.most_steps,
+                frequency_hz=each.frequency_range_hz,
+                amplitude_v=each.amplitude_range_v,
             )
             for name, each in self.states().items()
         }

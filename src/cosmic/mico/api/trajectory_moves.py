@@ -45,8 +45,9 @@ class LegMover:
         for axis, motion in leg.motions.items():
             left = self._left_to_do(axis, motion)
             if isinstance(left, Step):
-                hertz = scaled_hz(left.frequency_hz, speed)
-                self._counted.setdefault(axis, self._manager.state(axis).position or 0.0)
+                state = self._manager.state(axis)
+                hertz = scaled_hz(left.frequency_hz, speed, state.frequency_range_hz)
+                self._counted.setdefault(axis, state.position or 0.0)
                 motions[axis] = replace(left, frequency_hz=hertz)
             elif left is not None:
                 self._set_frequency(axis, speed)
@@ -99,7 +100,8 @@ class LegMover:
 
     def _set_frequency(self, axis: str, speed: float) -> None:
         usual = self._usual.setdefault(axis, self._site.frequency_hz(axis))
-        hertz = scaled_hz(self._wanted.get(axis) or usual, speed)
+        within_hz = self._manager.state(axis).frequency_range_hz
+        hertz = scaled_hz(self._wanted.get(axis) or usual, speed, within_hz)
         if hertz != self._sent.get(axis, usual):
             self._send_frequency(axis, hertz)
 

@@ -83,6 +83,9 @@ class TrajectorySite:
                 unit=state.unit,
                 has_sensor=class_for(state.kind, state.positioner).has_sensor,
                 limits=state.limits,
+                most_steps=state.most_steps,
+                frequency_hz=state.frequency_range_hz,
+                amplitude_v=state.amplitude_range_v,
             )
             for name, state in self.states().items()
         }

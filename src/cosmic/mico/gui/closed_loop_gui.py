@@ -12,7 +12,6 @@ from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override
 from cosmic.frame.units import format_quantity
-from cosmic.mico.core.motion.orders import FREQUENCY_HZ
 from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.gui.axis_menu import AxisMenu
 from cosmic.mico.gui.link_switch import LinkSwitch
@@ -73,8 +72,8 @@ class ClosedLoopGUI(PositionerBaseGUI):
         self._menu.more_toggled.connect(self._on_more)
 
     def _make_speed(self) -> None:
-        low, high = FREQUENCY_HZ
-        usual = float(self._defaults.closed_loop_frequency_hz)
+        low, high = self.axis.details.frequency_range_hz
+        usual = float(min(max(self._defaults.closed_loop_frequency_hz, low), high))
         self._speed = named(
             QuantityField(
                 "Hz", low=low, high=high, value=usual, integers=True, name="Speed limit of moves"

@@ -14,7 +14,6 @@ from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look, ui_font
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import AMPLITUDE_V, FREQUENCY_HZ, LARGEST_STEPS
 from cosmic.mico.core.motion.positioner import PositionerState, Status
 from cosmic.mico.core.settings import MotionDefaults, PositionerSettings
 from cosmic.mico.gui.axis_commands import AxisCommands
@@ -29,17 +28,16 @@ class StepsPart(QWidget):
     def __init__(self, axis: Axis, defaults: MotionDefaults, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._axis = axis
-        self.steps = _whole(
-            "MiCoOL_5", "steps", (0, LARGEST_STEPS), defaults.steps, "Steps of one click"
-        )
+        can = axis.details  # the ranges of its controller, which was asked for them
+        most = (0, can.most_steps)
+        self.steps = _whole("MiCoOL_5", "steps", most, defaults.steps, "Steps of one click")
         self.frequency = _whole(
-            "MiCoOL_6", "Hz", FREQUENCY_HZ, defaults.frequency_hz, "Steps per second"
+            "MiCoOL_6", "Hz", can.frequency_range_hz, defaults.frequency_hz, "Steps per second"
         )
-        low, high = AMPLITUDE_V
+        low, high = can.amplitude_range_v
+        shown_v = min(max(defaults.amplitude_v, low), high)
         self.amplitude = named(
-            QuantityField(
-                "V", low=low, high=high, value=defaults.amplitude_v, name="Amplitude of a step"
-            ),
+            QuantityField("V", low=low, high=high, value=shown_v, name="Amplitude of a step"),
             "MiCoOL_7",
         )
         row = QHBoxLayout(self)
@@ -73,9 +71,9 @@ class StepsPart(QWidget):
 def _whole(
     object_name: str, unit: str, span: tuple[int, int], value: int, name: str
 ) -> QuantityField:
-    field = QuantityField(
-        unit, low=span[0], high=span[1], value=float(value), integers=True, name=name
-    )
+    low, high = span
+    shown = float(min(max(value, low), high))
+    field = QuantityField(unit, low=low, high=high, value=shown, integers=True, name=name)
     return named(field, object_name)
 
 

@@ -8,7 +8,7 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import MoveCancelled
-from cosmic.mico.core.motion.orders import LARGEST_STEPS, Jog, Motion, MoveTo, Steer, Step
+from cosmic.mico.core.motion.orders import Jog, Motion, MoveTo, Steer, Step
 from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import PositionerKind
@@ -69,7 +69,7 @@ class JogRun:
         """Return the way that must be free for the axis to go on at `share` of its speed."""
         ahead_s = share * self._settings.jog.look_ahead_s
         if state.kind is PositionerKind.OPEN_LOOP:
-            steps = max(1, min(LARGEST_STEPS, round(self._jog.speed * ahead_s)))
+            steps = max(1, min(state.most_steps, round(self._jog.speed * ahead_s)))
             return self._step(steps, round(self._jog.speed))
         position = state.position if state.position is not None else math.nan
         target = position + self._jog.direction * self._speed * ahead_s

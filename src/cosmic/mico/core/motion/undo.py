@@ -16,7 +16,7 @@ from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.core.motion.device import Device
 from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.messages import MovementBegun, Order
-from cosmic.mico.core.motion.orders import FREQUENCY_HZ, LARGEST_STEPS, Motion, MoveTo, Step
+from cosmic.mico.core.motion.orders import Motion, MoveTo, Step
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.hw.interface import PositionerKind
 
@@ -318,19 +318,19 @@ class UndoHistory(QObject):
         """
         motions = {name: self._way_back(name, where) for name, where in entry.before.items()}
         slow_hz = {
-            name: self._slow_hz(motion.unit)
+            name: self._slow_hz(name, motion.unit)
             for name, motion in motions.items()
             if isinstance(motion, MoveTo)
         }
         return self._manager.order_together(motions, source=UNDO, slow_hz=slow_hz)
 
-    def _slow_hz(self, unit: str) -> int:
+    def _slow_hz(self, name: str, unit: str) -> int:
         defaults, undo = self._manager.settings.defaults, self._manager.settings.undo
         if unit == "deg":
             hertz = undo.speed_deg_s / defaults.nominal_step_deg
         else:
             hertz = undo.speed_um_s / defaults.nominal_step_um
-        low, high = FREQUENCY_HZ
+        low, high = self._manager.state(name).frequency_range_hz
         return max(low, min(high, math.ceil(hertz)))
 
     def _way_back(self, name: str, where: float) -> Motion:
@@ -342,7 +342,7 @@ class UndoHistory(QObject):
         step_um = found.step_um or defaults.nominal_step_um
         travel_um = where - (state.position or 0.0)
         steps = round(travel_um / step_um * 100.0 / defaults.amplitude_v)
-        if not abs(steps) <= LARGEST_STEPS:
+        if not abs(steps) <= state.most_steps:
             text = f"{name}: {format_quantity(travel_um, 'um')} back is more than it steps at once"
             raise refusal(refuse(Reason.LIMIT, text, axis=name))
         slow_hz = min(defaults.frequency_hz, self._manager.settings.jog.frequency_hz)

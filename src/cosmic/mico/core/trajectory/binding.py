@@ -7,9 +7,7 @@ from typing import Final
 from cosmic.frame.units import AxisUnit, format_quantity
 from cosmic.mico.core.motion.checks import ROUNDING
 from cosmic.mico.core.motion.orders import (
-    AMPLITUDE_V,
-    FREQUENCY_HZ,
-    LARGEST_STEPS,
+    COMMON,
     Motion,
     MoveBy,
     MoveTo,
@@ -33,11 +31,20 @@ MOST_PROBLEMS: Final = 200
 
 @dataclass(frozen=True, slots=True)
 class AxisFacts:
-    """What a trajectory must respect of one axis; limits in gate coordinates."""
+    """What a trajectory must respect of one axis; limits in gate coordinates.
+
+    Attributes
+    ----------
+    most_steps, frequency_hz, amplitude_v : int, tuple of int, tuple of float
+        The ranges of its controller.
+    """
 
     unit: AxisUnit
     has_sensor: bool
     limits: tuple[float, float] | None
+    most_steps: int = COMMON.most_steps
+    frequency_hz: tuple[int, int] = COMMON.frequency_hz
+    amplitude_v: tuple[float, float] = COMMON.amplitude_v
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +223,7 @@ class _Binder:
         if facts is None:
             return None
         if isinstance(part, Steps):
-            return self._steps(part)
+            return self._steps(part, facts)
         return self._move(part, facts)
 
     def _move(self, part: Move, facts: AxisFacts) -> Motion | None:
@@ -236,14 +243,14 @@ class _Binder:
             return MoveBy(part.value, facts.unit)
         return MoveTo(self._at[axis], facts.unit)
 
-    def _steps(self, part: Steps) -> Motion | None:
+    def _steps(self, part: Steps, facts: AxisFacts) -> Motion | None:
         defaults = self._facts.defaults
         volts = defaults.amplitude_v if part.amplitude_v is None else part.amplitude_v
         hertz = defaults.frequency_hz if part.frequency_hz is None else part.frequency_hz
         checks = (
-            (part.steps, -LARGEST_STEPS, LARGEST_STEPS, "steps"),
-            (volts, *AMPLITUDE_V, "V"),
-            (hertz, *FREQUENCY_HZ, "Hz"),
+            (part.steps, -facts.most_steps, facts.most_steps, "steps"),
+            (volts, *facts.amplitude_v, "V"),
+            (hertz, *facts.frequency_hz, "Hz"),
         )
         for value, low, high, unit in checks:
             if not low <= value <= high:
@@ -267,7 +274,7 @@ class _Binder:
                 text = f"the speed of {each.axis} is in {facts.unit}/s or Hz, not in {each.unit}"
                 self._add_problem(each.line, text)
             hertz /= nominal_step(self._facts.defaults, facts.unit)
-        low, high = FREQUENCY_HZ
+        low, high = facts.frequency_hz
         whole = max(1, round(hertz)) if hertz < high + 1 else high + 1
         if not low <= whole <= high:
             top = high * nominal_step(self._facts.defaults, facts.unit)

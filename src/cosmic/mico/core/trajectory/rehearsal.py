@@ -187,7 +187,10 @@ class _Play:
         before = self._poses[-1]
         targets = {axis: self._target(axis, motion) for axis, motion in leg.motions.items()}
         distances = {axis: target - before.get(axis, target) for axis, target in targets.items()}
-        hertz = {axis: scaled_hz(value, self._stage.speed) for axis, value in self._hertz.items()}
+        hertz = {
+            axis: scaled_hz(value, self._stage.speed, self._states[axis].frequency_range_hz)
+            for axis, value in self._hertz.items()
+        }
         facts = self._stage.facts
         times_s = leg_times_s(leg.motions, distances, hertz, facts.axes, facts.defaults)
         for axis, target in targets.items():

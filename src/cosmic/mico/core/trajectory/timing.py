@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-from cosmic.mico.core.motion.orders import FREQUENCY_HZ, Motion, Step
+from cosmic.mico.core.motion.orders import Motion, Step
 from cosmic.mico.core.settings import MotionDefaults
 from cosmic.mico.core.trajectory.binding import AxisFacts, nominal_step
 
@@ -47,7 +47,7 @@ def move_s(distance: float, speed: float, acceleration: float) -> float:
     return 2.0 * math.sqrt(distance / acceleration)
 
 
-def scaled_hz(frequency_hz: float, factor: float) -> int:
+def scaled_hz(frequency_hz: float, factor: float, within_hz: tuple[int, int]) -> int:
     """Return a frequency at a part of the speed, as far as the controller goes."""
-    low, high = FREQUENCY_HZ
+    low, high = within_hz
     return max(low, min(high, round(frequency_hz * factor)))
