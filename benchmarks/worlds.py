@@ -54,6 +54,7 @@ CALM = World(
     friction=(0.1, 0.3),
     clamp=("log", 20.0, 0.3),
     jaw_un_um=(1500.0, 0.3),
+    probe_side_un_um=12.0,
     contact_um=1.0,
     repeat_um=0.3,
     relaxation=(0.01, 0.0),
@@ -91,12 +92,12 @@ PAIRS = (
 
 
 PROVOKED: dict[Quality, dict[str, object]] = {
-    Quality.SLIPPED: {"slip": 1.0, "slip_um": (4.0, 10.0)},
+    Quality.SLIPPED: {"slip": 1.0, "slip_um": (5.0, 10.0)},
     Quality.RELAXED: {"relaxation": (0.12, 0.01)},
-    Quality.SET: {"yield_strain": (0.002, 0.1), "set_part": 0.5},
+    Quality.SET: {"yield_strain": (0.001, 0.1), "set_part": 0.5},
     Quality.HINGE: {"weak": 1.0},
     Quality.NON_UNIFORM: {"ei_cv": 0.5},
-    Quality.FRICTION: {"friction": (0.55, 0.65)},
+    Quality.FRICTION: {"friction": (0.6, 0.7)},
     Quality.CLAMP_DEEP: {"clamp": ("log", 110.0, 0.2)},
     Quality.MOVED: {"moved": 1.0},
     Quality.SATURATED: {"range_un": 25.0},
@@ -107,8 +108,8 @@ PROVOKED: dict[Quality, dict[str, object]] = {
 SUREST = (
     Quality.SATURATED,
     Quality.NOT_A_FIBRE,
-    Quality.BROKEN,
     Quality.SLIPPED,
+    Quality.BROKEN,
     Quality.SET,
     Quality.MOVED,
     Quality.HINGE,
@@ -131,7 +132,8 @@ def confusion(sessions: int, fibres: int) -> dict[Quality, Counter[str]]:
     for cause, change in PROVOKED.items():
         world, counts = replace(CALM, name=str(cause), **change), Counter[str]()
         for seed in range(sessions):
-            results, _ = session_of(world, 1000 + seed, fibres, FitSettings())
+            settings = FitSettings(range_un=world.range_un)
+            results, _ = session_of(world, 1000 + seed, fibres, settings)
             counts.update(named(each) for each in results)
         found[cause] = counts
     return found

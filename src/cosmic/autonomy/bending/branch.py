@@ -209,22 +209,3 @@ def back_and_forth_percent(points: Points, baseline_un: Floats) -> float:
         return math.nan
     there = np.interp(points.way_um[out][high], travel, force)
     return 100.0 * float(np.mean(height[out][high] - there)) / peak
-
-
-def largest_drop_un(points: Points, left_un: Floats, noise_un: Floats) -> float:
-    """Return by how much the force falls short at once, between two readings of the way out.
-
-    What slips in the jaws does so from one step to the next; what yields does so little by little.
-
-    Parameters
-    ----------
-    left_un : ndarray, shape (n,), float64
-        What the model leaves of the force.
-    noise_un : ndarray, shape (n,), float64
-        Of one reading, that of the stage included; a drop that may be noise is none.
-    """
-    out = np.flatnonzero(points.loading)
-    fall = -np.diff(left_un[out])
-    noise = np.hypot(noise_un[out][1:], noise_un[out][:-1])
-    clear = fall > CLEAR_SIGMAS * noise
-    return float(np.max(fall[clear])) if clear.any() else 0.0

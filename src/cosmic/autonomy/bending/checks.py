@@ -35,7 +35,7 @@ DEEP_PART: Final = 0.25
 """Of the shortest span: a clamp deeper than that is told."""
 
 VARIES_FROM: Final = 0.2
-MOSTLY: Final = 0.8
+MOSTLY: Final = 0.6
 RELAXES_FROM: Final = 0.04
 RELAXES_MOST: Final = 0.16
 RUBS_FROM: Final = 0.35
@@ -207,7 +207,7 @@ def _friction(fits: Sequence[SpanFit], base: float) -> tuple[float, float]:
     """Return friction as the difference of both ways tells it, and its standard deviation."""
     found = []
     for fit in fits:
-        if math.isfinite(fit.k_unloading_un_um) and abs(fit.by_friction) > 0.01:
+        if fit.k_unloading_un_um > 0.0 and abs(fit.by_friction) > 0.01:
             differs = math.log(fit.k_loading_un_um / fit.k_unloading_un_um)
             both = 2.0 * fit.by_friction
             std = math.hypot(fit.out_std_part, fit.back_std_part) / abs(both)

@@ -159,7 +159,7 @@ def usable(fits: Sequence[SpanFit]) -> tuple[int, ...]:
 
 
 def _has_value(fit: SpanFit) -> bool:
-    return math.isfinite(fit.k_un_um) and 0.0 < fit.out_std_part < math.inf
+    return fit.k_loading_un_um > 0.0 and 0.0 < fit.out_std_part < math.inf
 
 
 def fit_bending(spans: Sequence[Span], *, settings: FitSettings | None = None) -> BendingResult:

@@ -153,7 +153,7 @@ def readings_of(
     rows: list[tuple[int, float, float, float]] = []
     for number, fit in enumerate(fits):
         rows.append((number, fit.k_loading_un_um, fit.out_std_part, 1.0))
-        if math.isfinite(fit.k_unloading_un_um) and math.isfinite(fit.back_std_part):
+        if fit.k_unloading_un_um > 0.0 and math.isfinite(fit.back_std_part):
             rows.append((number, fit.k_unloading_un_um, fit.back_std_part, -1.0))
     span = np.array([row[0] for row in rows])
     k = np.array([row[1] for row in rows])
@@ -180,6 +180,9 @@ def readings_of(
             np.array([_aside(fits[n], sign) for n, sign in zip(span, way, strict=True)]),
         ]
     )
+    if certified is not None:
+        # Glass rubs otherwise than fibres do.
+        to_common[:, FRICTION] = 0.0
     apart = contact[:, None] * contact[None, :] * (span[:, None] == span[None, :])
     own = (
         ("shear", "um2", -response.by_square[span], settings.shear_um2, settings.shear_std_um2),
@@ -197,7 +200,7 @@ def readings_of(
         noise=noise,
         span=span,
         to_common=to_common,
-        own=own if certified is None else own[2:],
+        own=own if certified is None else (*own[2:], ("friction", "", friction, 0.0, friction_std)),
         repeat=apart * settings.contact_std_um**2,
         response=response,
         longest=_longest(response),

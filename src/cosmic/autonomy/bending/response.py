@@ -15,6 +15,8 @@ TURNED_RAD: Final = 0.01
 MOVED_UM: Final = 2.0
 BEYOND: Final = 1.5
 LEAST_TOUCHES: Final = 3
+DISAGREE_TIMES: Final = 4.0
+"""Of what the image may be wrong by: beyond that both witnesses are doubted, and neither taken."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,6 +132,8 @@ def direction_by_touch(
     turned = -float(apart @ (off - off.mean())) / noise_um**2 / information
     left = off - off.mean() + turned * apart
     excess = max(1.0, float(left @ left) / (len(shapes) - 2) / noise_um**2)
+    if abs(turned) > DISAGREE_TIMES * prior_rad:
+        return 0.0, abs(turned)
     return turned, min(math.sqrt(excess / information), prior_rad)
 
 

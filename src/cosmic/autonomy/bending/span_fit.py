@@ -13,7 +13,6 @@ from cosmic.autonomy.bending.branch import (
     Points,
     back_and_forth_percent,
     free_force_un,
-    largest_drop_un,
     lost_while_pushing,
     points_of,
     rises,
@@ -43,7 +42,9 @@ SLIPPED_PART: Final = 0.03
 """Of stroke and highest force: less does no harm."""
 
 SURE_TIMES: Final = 2.0
-YIELDS_FROM: Final = 0.4
+EXPLAINED_TIMES: Final = 3.0
+"""So much worse fits what leaves out something that acts."""
+
 MOST_FRICTION: Final = 0.8
 MODEL_PART: Final = 0.03
 """Of a stiffness: what both ways may differ by besides."""
@@ -352,7 +353,7 @@ def _flags(
         flags.add(Quality.SATURATED)
     if lost_while_pushing(points):
         flags.add(Quality.BROKEN)
-    gave_way = _gave_way(fit, points, settings, model.single_std(values))
+    gave_way = _gave_way(fit, points, settings, model, values)
     if gave_way is not None:
         flags.add(gave_way)
     if _differs(fit):
@@ -368,7 +369,9 @@ def _flags(
 
 def _differs(fit: SpanFit) -> bool:
     """Return whether loading and unloading differ by more than any friction makes them."""
-    if not math.isfinite(fit.back_std_part):
+    if not (
+        math.isfinite(fit.back_std_part) and min(fit.k_loading_un_um, fit.k_unloading_un_um) > 0
+    ):
         return False
     differs = abs(math.log(fit.k_loading_un_um / fit.k_unloading_un_um))
     variance = fit.out_std_part**2 + fit.back_std_part**2
@@ -378,17 +381,55 @@ def _differs(fit: SpanFit) -> bool:
 
 
 def _gave_way(
-    fit: SpanFit, points: Points, settings: FitSettings, noise_un: Floats
+    fit: SpanFit, points: Points, settings: FitSettings, model: _Model, values: Floats
 ) -> Quality | None:
     """Return whether the fibre slipped in the jaws or stayed bent; None: neither."""
     stroke = max(float(np.max(points.way_um)) - fit.hinge_um, 1e-3)
-    left = points.force_un - fit.fitted_un[points.kept]
-    if largest_drop_un(points, left, noise_un) > SLIPPED_PART * fit.peak_un:
-        return Quality.SLIPPED
     noise = fit.shift_std_um if math.isfinite(fit.shift_std_um) else math.inf
     allowed = math.hypot(CLEAR_SIGMAS * noise, SURE_TIMES * settings.reversal_um)
-    if not fit.shift_um > max(allowed, SLIPPED_PART * stroke):
-        return None
-    # Yielding makes the way out softer than the way back; a grip that gives way does not.
-    softer = (1.0 - fit.k_loading_un_um / fit.k_unloading_un_um) * stroke / fit.shift_um
-    return Quality.SET if softer > YIELDS_FROM else Quality.SLIPPED
+    at_once_um, slowly, plain = _ways_to_give(points, model, values)
+    best = min(at_once_um[0], slowly)
+    if plain > EXPLAINED_TIMES * max(best, 1.0):
+        if slowly < at_once_um[0]:
+            return Quality.SET if fit.shift_um > SLIPPED_PART * stroke else None
+        if at_once_um[1] > SLIPPED_PART * stroke:
+            return Quality.SLIPPED
+    # What gives way as the probe turns back leaves no trace on the way out.
+    return Quality.SLIPPED if fit.shift_um > max(allowed, SLIPPED_PART * stroke) else None
+
+
+def _ways_to_give(
+    points: Points, model: _Model, values: Floats
+) -> tuple[tuple[float, float], float, float]:
+    """Return how well the way out is explained by a slip at once, by yielding, and by neither.
+
+    Each as a sum of squares for one degree of freedom; the slip with its size, um. What slips in
+    the jaws does so between two readings, and what yields does so little by little from some point
+    on.
+    """
+    out = np.flatnonzero(points.loading)
+    weight = 1.0 / model.single_std(values)[out]
+    base = model.slopes(values)[out][:, [0, 1, -3, -1]]
+    left = (points.force_un - model.total(values))[out]
+    travel, k = points.way_um[out], math.exp(min(values[0], HIGHEST_LOG))
+    freedom = max(len(out) - base.shape[1] - 2, 1)
+
+    def explained(*extra: Floats) -> tuple[float, float]:
+        matrix = np.column_stack([base, *extra]) * weight[:, None]
+        found = np.linalg.lstsq(matrix, left * weight, rcond=None)[0]
+        rest = left * weight - matrix @ found
+        return float(rest @ rest) / freedom, float(found[-1])
+
+    plain = explained()[0]
+    slip, slowly = (plain, 0.0), plain
+    for begin in range(1, len(out) - 1):
+        if travel[begin] <= values[1]:
+            continue
+        step = -k * (np.arange(len(out)) >= begin).astype(float)
+        chi2, size_um = explained(step)
+        if size_um > 0.0 and chi2 < slip[0]:
+            slip = chi2, size_um
+        chi2, part = explained(-k * np.maximum(travel - travel[begin], 0.0))
+        if part > 0.0:
+            slowly = min(slowly, chi2)
+    return slip, slowly, plain

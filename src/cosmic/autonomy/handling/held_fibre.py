@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from cosmic.autonomy.bending.fit import MeasuredFibre
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.handling.plate import Reach
@@ -37,6 +38,8 @@ class HeldFibre:
         When it had the probe to itself, where two arms are at work.
     stuck : bool
         It could not be put away.
+    measured : MeasuredFibre or None
+        Its spans as they were fitted, each by itself.
     contacts : list of (float, float)
         Where along it, from the jaws, the probe has met it, and how far from where foreseen.
     """
@@ -58,6 +61,7 @@ class HeldFibre:
     ei_guess_n_m2: float | None = None
     spans: list[Span] = field(default_factory=list)
     images: dict[str, CameraImage] = field(default_factory=dict)
+    measured: MeasuredFibre | None = None
     bending: BendingResult | None = None
     peak_un: float = 0.0
     found_s: float = 0.0

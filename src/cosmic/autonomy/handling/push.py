@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
-from cosmic.autonomy.bending.fit import fit_bending
+from cosmic.autonomy.bending.fit import fit_campaign, measure_fibre
 from cosmic.autonomy.bending.plan import DRY_EI_N_M2, PlannedSpan, SpanLimits, guess_ei, plan_spans
 from cosmic.autonomy.bending.result import BendingError
 from cosmic.autonomy.bending.span import Span
@@ -397,6 +397,10 @@ def armed_while_pushing(work: HandlingContext) -> Iterator[None]:
         put_back(work, before)
 
 
+LEARNED_FROM: Final = 20
+"""Fibres before, from which what is common to all is learned."""
+
+
 class FitSpans(FibreOperation):
     """The bending stiffness of what was measured; fails where it may not be trusted."""
 
@@ -406,7 +410,11 @@ class FitSpans(FibreOperation):
     def steps(self, work: HandlingContext) -> Steps:
         fibre = work.held_fibre()
         fit = work.settings.push.fit.model_copy(update={"fibre_width_um": fibre.width_um})
-        fibre.bending = fit_bending(fibre.spans, settings=fit)
+        fibre.measured = measure_fibre(fibre.spans, settings=fit)
+        before = [each.measured for each in work.shared.finished if each.measured is not None]
+        # What is common to all fibres is learned from those before; the last ones are enough.
+        fibres = [*before[-LEARNED_FROM:], fibre.measured]
+        fibre.bending = fit_campaign(fibres, settings=fit)[-1]
         if not fibre.bending.trusted:
             raise OperationFailed(NOT_TRUSTED, "; ".join(fibre.bending.reasons))
         yield SAFE_POINT

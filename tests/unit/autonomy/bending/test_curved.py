@@ -72,7 +72,7 @@ def spans(turn_deg: float, *, seed: int = 1) -> list[Span]:
                 nominal_um=lever,
                 probe_x_um=lever,
                 hold_x_um=0.0,
-                way_um=travel,
+                way_um=travel - touch_um(line, at_um),
                 force_un=force + 0.01 * rng.standard_normal(48),
                 force_std_un=np.full(48, 0.01),
                 time_s=0.06 * np.arange(48),
@@ -81,6 +81,15 @@ def spans(turn_deg: float, *, seed: int = 1) -> list[Span]:
             )
         )
     return found
+
+
+def touch_um(line: np.ndarray, at_um: float) -> float:
+    """Return how high the middle of the probe stands where it just touches."""
+    fine = np.column_stack(
+        [np.interp(np.linspace(0, 1, 40001), np.linspace(0, 1, len(line)), each) for each in line.T]
+    )
+    off = RADIUS_UM**2 - (fine[:, 0] - at_um) ** 2
+    return float(np.max(fine[off > 0.0, 1] + np.sqrt(off[off > 0.0])))
 
 
 def old_lever_um(line: np.ndarray, at_um: float) -> float:

@@ -1,0 +1,169 @@
+"""Fibres of a campaign fitted together, in sealed sessions that share nothing with the fit."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from cosmic.autonomy.bending.curved import NaturalShape
+from cosmic.autonomy.bending.fit import (
+    Certificate,
+    MeasuredFibre,
+    fit_bending,
+    fit_campaign,
+    half_width_percent,
+    measure_fibre,
+)
+from cosmic.autonomy.bending.plan import plan_spans
+from cosmic.autonomy.bending.result import Kind, Quality
+from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.autonomy.bending.span import Span
+from oracles.pushed_rod import pushed
+from oracles.sealed_session import STANDARD_EI, Fibre, Session, World, curves, pushes
+
+SCALE = 1e-18
+WORLD = World(
+    noise_un=0.03,
+    friction=(0.25, 0.25),
+    clamp=("log", 20.0, 0.3),
+    jaw_un_um=(1500.0, 0.0),
+    probe_side_un_um=10.0,
+    relaxation=(0.01, 0.0),
+)
+CERTIFICATE = Certificate(STANDARD_EI * SCALE, 0.02)
+
+
+def spans_of(session: Session, fibre: Fibre, *, shown_deg: float = 0.0) -> list[Span]:
+    """Return what a procedure would measure of a fibre."""
+    plan = plan_spans(min(fibre.free_um, 900.0), fibre.ei * SCALE)
+    line = fibre.line(shown_deg)
+    return [
+        Span(
+            nominal_um=each.place_um,
+            probe_x_um=each.place_um,
+            hold_x_um=0.0,
+            way_um=each.way_um,
+            force_un=each.force_un,
+            force_std_un=each.std_un,
+            time_s=each.time_s,
+            loading=each.loading,
+            shape=NaturalShape(line[:, 0], line[:, 1], each.place_um),
+        )
+        for each in pushes(session, fibre, [(one.span_um, one.stroke_um) for one in plan])
+    ]
+
+
+def measured(
+    session: Session, fibre: Fibre, settings: FitSettings, certificate: Certificate | None = None
+) -> MeasuredFibre:
+    return measure_fibre(spans_of(session, fibre), settings=settings, certificate=certificate)
+
+
+def test_the_generator_bends_as_a_chain_of_least_energy() -> None:
+    session = Session(World(), np.random.default_rng(1))
+    fibre = dataclasses.replace(Fibre.standard(session), turn_deg=30.0, depth_um=20.0)
+    travel, across, *_ = curves(dataclasses.replace(fibre, friction=0.0), np.array([400.0]))
+    chain = pushed(
+        fibre.line(),
+        ei_un_um2=fibre.ei,
+        probe_x_um=400.0,
+        radius_um=25.0,
+        travel_um=25.0,
+        depth_um=20.0,
+        links=100,
+    )
+    assert np.interp(25.0, travel[0, 0], across[0, 0]) == pytest.approx(chain, rel=6e-3)
+
+
+def test_a_standard_gives_the_scale_that_the_certificate_of_the_sensor_does_not() -> None:
+    settings, world = FitSettings(), dataclasses.replace(WORLD, gain=0.0)
+    session = Session(world, np.random.default_rng(5))
+    session.gain = 1.06
+    fibres = [Fibre.drawn(session) for _ in range(3)]
+    kept = [measured(session, each, settings) for each in fibres]
+    standard = measured(session, Fibre.standard(session), settings, CERTIFICATE)
+    without = fit_campaign(kept, settings=settings)
+    with_it = fit_campaign(kept, standards=[standard], settings=settings)
+    for fibre, alone, verified in zip(fibres, without, with_it, strict=True):
+        true = fibre.true_ei(600.0) * SCALE
+        assert not alone.scale_verified
+        assert verified.scale_verified
+        assert verified.ei_n_m2 / alone.ei_n_m2 == pytest.approx(1.0 / 1.06, abs=0.03)
+        assert verified.ei_low_n_m2 < true < verified.ei_high_n_m2
+        assert half_width_percent(verified) < half_width_percent(alone)
+
+
+def test_what_others_say_of_clamp_and_friction_makes_an_interval_narrower() -> None:
+    settings, session = FitSettings(), Session(WORLD, np.random.default_rng(8))
+    fibres = [Fibre.drawn(session) for _ in range(7)]
+    kept = [measured(session, each, settings) for each in fibres]
+    together = fit_campaign(kept, settings=settings)
+    alone = [fit_campaign([each], settings=settings)[0] for each in kept]
+    narrower = [
+        half_width_percent(one) / half_width_percent(other)
+        for one, other in zip(together, alone, strict=True)
+    ]
+    assert np.median(narrower) < 0.95
+    for fibre, found in zip(fibres, together, strict=True):
+        assert found.ei_low_n_m2 < fibre.true_ei(600.0) * SCALE < found.ei_high_n_m2
+
+
+def test_the_budget_is_whole_and_says_which_way_each_line_is_known() -> None:
+    session = Session(WORLD, np.random.default_rng(2))
+    found = fit_bending(spans_of(session, Fibre.drawn(session)))
+    assert sum(line.share for line in found.budget) == pytest.approx(1.0)
+    shares = [line.share for line in found.budget]
+    assert shares == sorted(shares, reverse=True)
+    kinds = {line.source: line.kind for line in found.budget}
+    assert kinds["readings"] is Kind.A
+    assert kinds["scale of the force"] is Kind.B
+    scale = next(line for line in found.budget if line.source == "scale of the force")
+    assert scale.sensitivity == pytest.approx(1.0, abs=1e-6)
+    half = math.log(found.ei_high_n_m2 / found.ei_low_n_m2) / 2.0 / 1.96
+    assert scale.std * math.sqrt(1.0 / scale.share) == pytest.approx(half, rel=0.25)
+
+
+def test_where_the_probe_touches_puts_right_what_the_image_has_wrong() -> None:
+    world = dataclasses.replace(WORLD, arc_deg=(40.0, 0.0))
+    session = Session(world, np.random.default_rng(3))
+    fibre = Fibre.drawn(session)
+    true = fibre.true_ei(600.0) * SCALE
+    for shown_deg in (-2.0, 2.0):
+        found = fit_bending(spans_of(session, fibre, shown_deg=shown_deg))
+        assert found.trusted, found.reasons
+        assert found.ei_low_n_m2 < true < found.ei_high_n_m2
+        line = next(each for each in found.budget if each.source == "direction of the fibre")
+        assert line.std < math.radians(0.5)
+
+
+CAUSES = {
+    Quality.SLIPPED: {"slip": 1.0, "slip_um": (8.0, 9.0)},
+    Quality.RELAXED: {"relaxation": (0.12, 0.0)},
+    Quality.SET: {"yield_strain": (0.001, 0.0), "set_part": 0.5},
+    Quality.HINGE: {"weak": 1.0},
+    Quality.FRICTION: {"friction": (0.7, 0.7)},
+    Quality.CLAMP_DEEP: {"clamp": ("log", 110.0, 0.0)},
+    Quality.MOVED: {"moved": 1.0},
+    Quality.SATURATED: {"range_un": 25.0},
+    Quality.NOT_A_FIBRE: {"not_fibre": 1.0},
+}
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+def test_a_cause_is_named_where_it_acts(cause: Quality) -> None:
+    world = dataclasses.replace(WORLD, **CAUSES[cause])
+    settings = FitSettings(range_un=world.range_un)
+    session, named = Session(world, np.random.default_rng(21)), 0
+    kept = [measured(session, Fibre.drawn(session), settings) for _ in range(4)]
+    for found in fit_campaign(kept, settings=settings):
+        named += cause in found.flags | found.notes
+    assert named >= 3
+
+
+def test_a_quiet_fibre_has_nothing_to_name() -> None:
+    session = Session(WORLD, np.random.default_rng(4))
+    kept = [measured(session, Fibre.drawn(session), FitSettings()) for _ in range(4)]
+    for found in fit_campaign(kept):
+        assert found.trusted, found.reasons
+        assert not found.notes
