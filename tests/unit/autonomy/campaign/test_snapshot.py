@@ -73,7 +73,7 @@ def test_a_card_has_curves_from_the_first_contact_without_their_baseline() -> No
     assert len(card.curves) == len(record.spans)
     for curve, span in zip(card.curves, record.spans, strict=True):
         assert curve.way_um.shape == curve.force_un.shape == curve.fitted_un.shape
-        before = curve.force_un[curve.way_um < -2.0]
+        before = curve.force_un[curve.way_um < -0.5]
         assert np.abs(before).max() < 3.0, "the baseline is taken out"
         assert curve.force_un.max() > 20.0
         fitted = np.isfinite(curve.fitted_un)
@@ -86,7 +86,7 @@ def test_a_card_has_curves_from_the_first_contact_without_their_baseline() -> No
 def test_a_span_that_was_not_fitted_is_shown_all_the_same() -> None:
     card = card_of(replace(good(1), bending=None))
     assert card.ei is None
-    assert len(card.curves) == 3
+    assert len(card.curves) == len(good(1).spans)
     for curve in card.curves:
         assert curve.way_um.min() == 0.0
         assert np.isnan(curve.fitted_un).all()
