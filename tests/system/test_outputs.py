@@ -81,3 +81,21 @@ def test_stop_without_axes_makes_outputs_safe(platform: Path) -> None:
             rig.daqco.set_output("piezo", 3.0)
         rig.reset_stop()
         rig.daqco.set_output("piezo", 3.0)
+
+
+def test_a_recording_says_what_outputs_were_given(rig: cosmic.Rig, tmp_path: Path) -> None:
+    with rig.daqco.record(tmp_path / "run.h5"):
+        rig.daqco.set_output("piezo", 1.5)
+        rig.daqco.set_line("lamp", high=True)
+        rig.daqco.play("piezo", np.array([1.0, 2.0]), 100.0)
+        rig.stop("enough")
+        assert wait_until(lambda: rig.daqco.outputs[1].value == 0.0, 5.0)
+    with cosmic.open_recording(tmp_path / "run.h5") as recording:
+        given = [each.text for each in recording.events if each.kind == "output"]
+    assert given == [
+        "piezo: 1.5 V",
+        "lamp: high",
+        "piezo: 2 values at 100 Hz",
+        "piezo: its safe value (enough)",
+        "lamp: its safe value (enough)",
+    ]

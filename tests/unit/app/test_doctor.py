@@ -82,6 +82,21 @@ def test_a_library_that_the_platform_file_needs_is_a_problem(
     assert "!!  scu3d" in capsys.readouterr().out
 
 
+def test_a_second_driver_of_boards_that_is_missing_is_a_problem(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    code, said = page(capsys)
+    assert (code, finding(said, "labjack")["state"]) == (0, "note")
+    second = '[[daqco.driver]]\nbackend = "labjack"\n\n[[daqco.scale]]\nname = "FT-S540"'
+    old = re.escape('[[daqco.scale]]\nname = "FT-S540"')
+    config = changed(tmp_path / "config", old, second)
+    capsys.readouterr()
+    code, said = page(capsys, "--config", config)
+    assert code == 1
+    found = finding(said, "labjack")
+    assert found["state"] == "problem" and "Install LJM" in found["advice"]
+
+
 def test_devices_that_answer_are_listed_with_their_library(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

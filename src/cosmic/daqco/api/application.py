@@ -135,6 +135,7 @@ class DaqcoApplication(TaskApplication):
             lambda board: open_outputs(library, board),
             policy,
             self.status_changed.emit,
+            note=lambda text: self.recorder.note("output", text),
         )
         self.stopped_outside: Callable[[], str] = lambda: ""
         self._restarts = RestartBudget()

@@ -73,6 +73,8 @@ class OutputControl(WorkerThread):
         Returns the outputs of a board by its name.
     changed : callable
         Called after each change, in any thread.
+    note : callable
+        Takes what was written, for a recording; in any thread, must return at once.
     """
 
     def __init__(
@@ -81,11 +83,13 @@ class OutputControl(WorkerThread):
         open_board: Callable[[str], BoardOutputs],
         policy: FailurePolicy,
         changed: Callable[[], object],
+        note: Callable[[str], object] = lambda _text: None,
     ) -> None:
         super().__init__("outputs", policy)
         self._settings = {each.name: each for each in settings}
         self._open_board = open_board
         self._changed = changed
+        self._note = note
         self._lock = RLock()
         self._boards: dict[str, BoardOutputs] = {}
         self._states = {each.name: _begun(each) for each in settings}
@@ -124,6 +128,7 @@ class OutputControl(WorkerThread):
             self._check_free(name)
             self._outputs(each).write(_analog(each), float(volts))
             self._put(name, float(volts), dead_man)
+        self._note(f"{name}: {volts:g} V")
         self._changed()
 
     def set_line(self, name: str, *, high: bool, dead_man: DeadMan | None = None) -> None:
@@ -133,6 +138,7 @@ class OutputControl(WorkerThread):
             self._check_free(name)
             self._outputs(each).write_line(each.output, high=high)
             self._put(name, float(high), dead_man)
+        self._note(f"{name}: {'high' if high else 'low'}")
         self._changed()
 
     def play(self, name: str, waveform: Waveform, dead_man: DeadMan | None = None) -> float:
@@ -152,6 +158,9 @@ class OutputControl(WorkerThread):
             self._check_free(name)
             made_hz = self._outputs(each).play(_analog(each), replace(waveform, volts=volts))
             self._put(name, None, dead_man)
+        begins = f", from the edge of {waveform.trigger} on" if waveform.trigger else ""
+        again = ", repeated" if waveform.repeat else ""
+        self._note(f"{name}: {volts.size} values at {made_hz:g} Hz{again}{begins}")
         self._wake.set()
         self._changed()
         return made_hz
@@ -183,7 +192,7 @@ class OutputControl(WorkerThread):
         """Open the boards, and drive every output to its safe value; what fails is told of it."""
         if not self._settings:
             return
-        self.make_safe("acquisition begins")
+        self.make_safe("the boards are opened")
         if not self.isRunning():
             self.start()
 
@@ -270,6 +279,7 @@ class OutputControl(WorkerThread):
             )
             return
         logger.info("output %s at its safe value: %s", name, reason)
+        self._note(f"{name}: its safe value ({reason})")
         state = self._states[name]
         self._states[name] = replace(state, value=state.safe, playing=False, problem="")
 
