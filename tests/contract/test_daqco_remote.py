@@ -130,6 +130,7 @@ GIVEN: dict[str, Callable[[DaqcoRig], object]] = {
         rig.daqco.settings.model_copy(update={"refresh_hz": 10.0})
     ),
     "set_scale": lambda rig: rig.daqco.set_scale("channel1", Scale("Lamp", "mW", (1.0, 2.0))),
+    "tare": lambda rig: rig.daqco.tare("force"),
     "start_recording": lambda rig: rig.daqco.start_recording(rig.daqco.directory / "all.h5"),
     "mark": lambda rig: rig.daqco.mark("here"),
     "stop_recording": lambda rig: rig.daqco.stop_recording(),
@@ -145,6 +146,16 @@ GIVEN: dict[str, Callable[[DaqcoRig], object]] = {
     "disarm_limit": lambda rig: rig.daqco.disarm_limit("force"),
     "remove_limit": lambda rig: rig.daqco.remove_limit("force"),
 }
+
+
+def test_a_tare_calls_the_present_force_zero_and_says_what_it_was(rig: DaqcoRig) -> None:
+    assert wait_until(lambda: rig.daqco.latest_chunk is not None)
+    before = rig.daqco.latest()["force"]
+    assert rig.daqco.tare("force") == pytest.approx(before, abs=0.2)
+    assert rig.daqco.units["force"] == "uN"
+    assert wait_until(lambda: abs(rig.daqco.latest()["force"]) < 0.2)
+    with pytest.raises(NotAvailable):
+        rig.daqco.tare("nothing")
 
 
 def test_every_command_that_is_declared_is_carried_out(rig: DaqcoRig) -> None:

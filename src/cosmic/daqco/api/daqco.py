@@ -331,6 +331,24 @@ class Daqco(Declared):
         """Give a channel another scale; raises `ConfigError` where there is no such channel."""
         self._application.set_scale(channel, scale)
 
+    @command(timeout_s=SLOW_S)
+    def tare(self, channel: str) -> float:
+        """Call the present value of a channel zero, by another scale; returns what it was.
+
+        Raises
+        ------
+        NotAvailable
+            Nothing has been acquired yet, or not this channel.
+        """
+        chunk = self.latest_chunk
+        if chunk is None or channel not in chunk.channels:
+            raise NotAvailable(self.problem or f"{channel}: nothing has been acquired yet")
+        value = float(chunk.values[chunk.channels.index(channel)].mean())
+        scale = self.scales[channel]
+        first, *rest = scale.coefficients
+        self.set_scale(channel, Scale(scale.name, scale.unit, (first - value, *rest)))
+        return value
+
     # Recording
 
     @property
