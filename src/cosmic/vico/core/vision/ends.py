@@ -10,6 +10,9 @@ from cosmic.vico.core.vision.grey import Floats, middle
 from cosmic.vico.core.vision.profiles import Flags, Scene, sample, within
 from cosmic.vico.core.vision.smoothing import directions
 
+# Grey levels: below, there is nothing of which a half could be told.
+LEAST_HEIGHT = 1e-3
+
 
 class EndKind(StrEnum):
     """What an end of a fibre is."""
@@ -92,7 +95,7 @@ def bent(line: Floats, outward: Floats, along: Floats) -> Floats:
 
 def crossing(along: Floats, mean: Floats, inside: Flags, height: float, level: Level) -> End:
     """Return the first point that stays below half of the height."""
-    if not height > 0.4 * level.contrast:
+    if not height > max(0.4 * level.contrast, LEAST_HEIGHT):
         return End(EndKind.LOST, 0.0, level.width)
     scaled = mean / height
     falls = np.nonzero((scaled[:-1] >= 0.5) & (scaled[1:] < 0.5))[0]

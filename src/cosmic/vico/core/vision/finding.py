@@ -49,8 +49,9 @@ def find_fibres(image: npt.NDArray[np.generic]) -> list[Fibre]:
     Parameters
     ----------
     image : ndarray, shape (height, width), uint8 or uint16
-        Fibres darker or lighter than the ground. An image of shape (height, width, 3) is taken
-        as blue, green, red and turned to grey.
+        Fibres darker or lighter than the ground. An image of shape (height, width, 3) or
+        (height, width, 4) is taken as blue, green, red, opacity and turned to grey; bool, other
+        whole numbers and floats are converted as `grey_image` says.
 
     Returns
     -------
@@ -60,16 +61,17 @@ def find_fibres(image: npt.NDArray[np.generic]) -> list[Fibre]:
     Raises
     ------
     ConfigError
-        The image has another type or shape, or is smaller than 16 x 16.
+        The image has another type or shape, or is smaller than 16 x 16; dtype and shape are named.
     NotAvailable
         They cannot be looked for on this image.
     """
     pixels = grey_image(image)
     try:
         return _found(pixels)
-    except (ValueError, ArithmeticError, IndexError) as exc:  # numpy's and scipy's among them
+    except (ValueError, ArithmeticError, IndexError, cv2.error) as exc:  # numpy's, scipy's too
         raise NotAvailable(
-            f"fibres cannot be looked for on this image ({type(exc).__name__}: {exc}); take "
+            f"fibres cannot be looked for on this image, {image.dtype} of shape {image.shape} "
+            f"({type(exc).__name__}: {exc}); take "
             "another, or change zoom, focus or light"
         ) from exc
 

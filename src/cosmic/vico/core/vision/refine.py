@@ -92,8 +92,7 @@ def _refined(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | N
         stretch(course)
         if len(course.line) < 6:
             return None
-    measure(scene, course, neighbours)
-    return course
+    return course if measure(scene, course, neighbours) else None
 
 
 def first_line(scene: Scene, strand: Strand, wave_px: float) -> Floats:
