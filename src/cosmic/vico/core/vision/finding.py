@@ -8,7 +8,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from cosmic.frame.errors import NotAvailable
-from cosmic.vico.core.vision import checks
+from cosmic.vico.core.vision import axial, checks
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
@@ -272,7 +272,7 @@ def checked_fibres(
     sections = pooled([section_of(scene, course) for _, course in courses])
     found = []
     for index, (strand, course) in enumerate(courses):
-        doubts = [*strand.doubts, *checks.doubts_of(course)]
+        doubts = [*strand.doubts, *checks.doubts_of(course), *axial.joints(scene, course)]
         if touches_border(scene, course):
             doubts.append(EndKind.BORDER.value)
         if crowd:

@@ -1,0 +1,116 @@
+"""Signs along a fibre's axis that it is two fibres end to end.
+
+Each cross section gives the grey levels inside the fibre and what all of it takes from the light.
+One fibre changes slowly along its axis; where one ends and another begins there is a gap, a waist,
+a patch that is twice as dark, or a step. What counts as a sign is judged against the fibre's own
+unevenness, so that a rough fibre is not taken to pieces.
+"""
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import binary_erosion, gaussian_filter1d, median_filter, uniform_filter1d
+
+from cosmic.vico.core.vision.grey import Floats, Floats32, middle
+from cosmic.vico.core.vision.profiles import Flags, Scene, sample
+from cosmic.vico.core.vision.refine import Course
+from cosmic.vico.core.vision.smoothing import arc_lengths, directions, resampled
+
+GAP = "the ground shines through in one place: it may be two fibres end to end"
+DOUBLED = "a stretch of it is denser than the rest: two fibres may overlap there"
+STEP = "its width, contrast or course changes in one step: it may be two fibres end to end"
+
+# Standard deviations of the fibre's own unevenness.
+TIMES = 6.5
+# Shares of the fibre's contrast, or of its width, below which nothing is a sign.
+DIP, BUMP = 0.1, 0.3
+CONTRAST_STEP, WIDTH_STEP = 0.12, 0.1
+SIDE_STEP, SIDE_STEP_PX = 0.04, 0.4
+
+
+def joints(scene: Scene, course: Course) -> list[str]:
+    """Return the signs along a course that one fibre ends on it and another begins."""
+    line = resampled(course.line, 1.0)
+    blur = max(1.0, min(course.blur_px, 0.4 * course.width))
+    seen = _seen(course, line, blur)
+    if seen.sum() < 6.0 * course.width:
+        return []
+    height, across = _heights(scene, course, line, blur)
+    inner = height[:, np.abs(across) <= 0.3 * course.width].mean(axis=1).astype(np.float64)
+    typical = middle(inner[seen])
+    if not typical > 0:
+        return []
+    inner /= typical
+    mass = height.sum(axis=1).astype(np.float64)
+    mass /= max(middle(mass[seen]), 1e-6)
+    parts = (np.abs(height) * across).sum(axis=1) / np.maximum(np.abs(height).sum(axis=1), 1e-6)
+    side = parts.astype(np.float64) / course.width
+    found = []
+    window = 2 * int(3.0 * course.width) + 1
+    fine = [_uneven(values, blur, window) for values in (inner, mass)]
+    if any(_beyond(-values, seen, DIP) for values in fine):
+        found.append(GAP)
+    if _beyond(fine[0], seen, BUMP):
+        found.append(DOUBLED)
+    steps = (
+        (inner, CONTRAST_STEP),
+        (mass, WIDTH_STEP),
+        (side, max(SIDE_STEP, SIDE_STEP_PX / course.width)),
+    )
+    if any(_stepped(values, seen, course.width, blur, least) for values, least in steps):
+        found.append(STEP)
+    return found
+
+
+def _seen(course: Course, line: Floats, blur: float) -> Flags:
+    """Return the points with nothing else near, away from the ends."""
+    s, at = arc_lengths(course.line), arc_lengths(line)
+    good = np.interp(at, s, course.good.astype(float)) > 0.99
+    good = binary_erosion(good, iterations=max(1, int(0.5 * course.width)))
+    skip = int(np.ceil(0.75 * course.width + 3.0 * blur))
+    good[:skip] = good[-skip:] = False
+    return np.asarray(good, dtype=np.bool_)
+
+
+def _heights(
+    scene: Scene, course: Course, line: Floats, blur: float
+) -> tuple[Floats32, npt.NDArray[np.float32]]:
+    """Return what stands out from the ground at each point, shape (n, m), and where across."""
+    half = 0.5 * course.width + 1.5 * blur
+    across = np.arange(-np.ceil(half), np.ceil(half) + 0.5, 1.0).astype(np.float32)
+    tangent = directions(line)
+    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+    x, y = (
+        (line[:, n, None] + across[None, :] * normal[:, n, None]).astype(np.float32) for n in (0, 1)
+    )
+    ground = np.interp(arc_lengths(line), arc_lengths(course.line), course.ground)
+    values = sample(scene.image, x, y) - ground[:, None].astype(np.float32)
+    return np.asarray(scene.sign * values, dtype=np.float32), across
+
+
+def _uneven(values: Floats, blur: float, window: int) -> Floats:
+    """Return values about as fine as the image is sharp, without what changes slowly."""
+    fine = gaussian_filter1d(values, 0.7 * blur, mode="nearest")
+    return np.asarray(fine - median_filter(fine, window, mode="nearest"))
+
+
+def _beyond(values: Floats, seen: Flags, least: float) -> bool:
+    """Return whether something stands out from a fibre's own unevenness."""
+    spread = 1.4826 * middle(np.abs(values[seen]))
+    return bool((values[seen] > max(least, TIMES * spread)).any())
+
+
+def _stepped(values: Floats, seen: Flags, width: float, blur: float, least: float) -> bool:
+    """Return whether the mean of a stretch differs from that of the next one."""
+    size = max(6, int(1.5 * width))
+    apart = int(np.ceil(0.5 * size + 1.5 * blur))
+    if len(values) < 4 * size + 4 * apart:
+        return False
+    mean = uniform_filter1d(values, size, mode="nearest")
+    step = mean[2 * apart :] - mean[: -2 * apart]
+    whole = binary_erosion(seen, iterations=apart + size // 2)[apart:-apart]
+    if whole.sum() < size:
+        return False
+    # What a slope gives at both sides of a step belongs to no step.
+    step = step - median_filter(step, 4 * size + 1, mode="nearest")
+    spread = 1.4826 * middle(np.abs(step[whole]))
+    return bool((np.abs(step[whole]) > max(least, TIMES * spread)).any())
