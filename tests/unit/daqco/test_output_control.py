@@ -226,6 +226,31 @@ def test_a_stop_returns_at_once_while_a_board_does_not_answer() -> None:
     site.control.close()
 
 
+def test_a_board_that_hangs_keeps_no_other_from_its_safe_value(site: Site) -> None:
+    site.control.set_line("valve", high=False)
+    answers, hangs = threading.Event(), threading.Event()
+    outputs = site.control._boards["Dev1"]
+    write = outputs.write
+
+    def slow(output, volts):
+        hangs.set()
+        answers.wait(20.0)
+        write(output, volts)
+
+    outputs.write = slow
+    hung = threading.Thread(target=site.control.set_voltage, args=("piezo", 3.0))
+    hung.start()
+    assert hangs.wait(5.0)
+    site.control.stop("STOP was pressed")
+    wait_until(lambda: site.state("valve").value == 1.0)
+    assert site.library.line_is_high("Dev2", "port0/line3")
+    assert hung.is_alive()
+    answers.set()
+    hung.join(10.0)
+    wait_until(lambda: site.state("piezo").value == 0.5)
+    assert site.volts("ao0") == 0.5
+
+
 def test_another_waveform_that_keeps_the_board_is_ended_for_a_safe_value(site: Site) -> None:
     site.control.set_voltage("piezo", 3.0)
     site.control.play("heater", Waveform(np.array([0.1, 0.2]), 100.0, repeat=True))

@@ -13,6 +13,7 @@ from typing_extensions import override
 from cosmic.daqco.core.settings import OutputSettings
 from cosmic.daqco.hw.interface import Volts
 from cosmic.daqco.hw.outputs import AnalogOutput, BoardOutputs, Waveform
+from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ArgumentError, ConfigError, CosmicError, NotAvailable, refusal
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.dead_man import DeadMan
@@ -22,6 +23,8 @@ from cosmic.frame.verdict import Reason, refuse
 logger = logging.getLogger(__name__)
 
 LOOK_S: Final = 0.05
+PATIENCE_S: Final = 5.0
+"""So long a board may take until it is given up."""
 MOST_SAMPLES: Final = 1_000_000
 
 
@@ -90,7 +93,8 @@ class OutputControl(WorkerThread):
         self._open_board = open_board
         self._changed = changed
         self._note = note
-        self._lock = RLock()
+        # One a board: a driver that hangs keeps no other board from its safe values.
+        self._locks = {each.board: RLock() for each in settings}
         self._boards: dict[str, BoardOutputs] = {}
         self._states = {each.name: _begun(each) for each in settings}
         self._dead_men: dict[str, DeadMan] = {}
@@ -124,7 +128,7 @@ class OutputControl(WorkerThread):
         """
         each = self._named(name, analog=True)
         self._check_volts(each, float(volts), float(volts))
-        with self._lock:
+        with self._locks[each.board]:
             self._check_free(name)
             self._outputs(each).write(_analog(each), float(volts))
             self._put(name, float(volts), dead_man)
@@ -134,7 +138,7 @@ class OutputControl(WorkerThread):
     def set_line(self, name: str, *, high: bool, dead_man: DeadMan | None = None) -> None:
         """Set a digital line; raises as `set_voltage`."""
         each = self._named(name, analog=False)
-        with self._lock:
+        with self._locks[each.board]:
             self._check_free(name)
             self._outputs(each).write_line(each.output, high=high)
             self._put(name, float(high), dead_man)
@@ -154,7 +158,7 @@ class OutputControl(WorkerThread):
         each = self._named(name, analog=True)
         volts = _checked(name, waveform)
         self._check_volts(each, float(volts.min()), float(volts.max()))
-        with self._lock:
+        with self._locks[each.board]:
             self._check_free(name)
             made_hz = self._outputs(each).play(_analog(each), replace(waveform, volts=volts))
             self._put(name, None, dead_man)
@@ -166,11 +170,11 @@ class OutputControl(WorkerThread):
         return made_hz
 
     def make_safe(self, reason: str) -> None:
-        """Drive every output to its safe value; returns when that is done, and latches nothing."""
-        with self._lock:
-            for name, each in self._settings.items():
-                self._drive_safe(name, each, reason)
-        self._changed()
+        """Drive every output to its safe value; returns when that is done, and latches nothing.
+
+        A board that does not answer for some seconds is given up.
+        """
+        self._drive_all_safe(tuple(self._settings.values()), reason)
 
     def stop(self, reason: str) -> None:
         """Drive outputs marked so to their safe values, and let nothing be written before `reset`.
@@ -207,10 +211,9 @@ class OutputControl(WorkerThread):
         self.join()
         if self._boards:
             self.make_safe("the program ends")
-        with self._lock:
-            for board in self._boards.values():
-                board.close()
-            self._boards.clear()
+        for board in tuple(self._boards.values()):
+            board.close()
+        self._boards.clear()
 
     @override
     def run_body(self) -> None:
@@ -227,10 +230,27 @@ class OutputControl(WorkerThread):
 
     def _carry_out_stop(self) -> None:
         self._unsafe = False
-        with self._lock:
-            for name, each in self._settings.items():
-                if each.stops:
-                    self._drive_safe(name, each, self._stopped)
+        wanted = tuple(each for each in self._settings.values() if each.stops)
+        self._drive_all_safe(wanted, self._stopped)
+
+    def _drive_all_safe(self, wanted: Sequence[OutputSettings], reason: str) -> None:
+        """Drive outputs to their safe values, board by board; who is busy comes later."""
+        left = dict.fromkeys(each.board for each in wanted)
+        until_s = WALL.now_s() + PATIENCE_S
+        while left and WALL.now_s() < until_s:
+            for board in tuple(left):
+                if not self._locks[board].acquire(timeout=LOOK_S):
+                    continue
+                try:
+                    for each in wanted:
+                        if each.board == board:
+                            self._drive_safe(each.name, each, reason)
+                finally:
+                    self._locks[board].release()
+                del left[board]
+        for each in wanted:
+            if each.board in left:
+                self._note_unsafe(each.name, reason, f"{each.board} does not answer")
         self._changed()
 
     def _look_for_silence(self) -> None:
@@ -238,7 +258,7 @@ class OutputControl(WorkerThread):
             why = dead_man.why
             if not why:
                 continue
-            with self._lock:
+            with self._locks[self._settings[name].board]:
                 if self._dead_men.get(name) is dead_man:
                     self._drive_safe(name, self._settings[name], why)
             self._changed()
@@ -249,7 +269,7 @@ class OutputControl(WorkerThread):
             if not state.playing:
                 continue
             each = self._settings[name]
-            with self._lock:
+            with self._locks[each.board]:
                 try:
                     over = self._outputs(each).playing != each.output
                     problem = ""
@@ -273,15 +293,17 @@ class OutputControl(WorkerThread):
                 outputs.end_waveform()  # which may keep the board from any other output
                 _write_safe(outputs, each)
         except CosmicError as exc:
-            logger.error("output %s cannot be made safe (%s): %s", name, reason, exc)
-            self._states[name] = replace(
-                self._states[name], value=None, playing=False, problem=str(exc)
-            )
+            self._note_unsafe(name, reason, str(exc))
             return
         logger.info("output %s at its safe value: %s", name, reason)
         self._note(f"{name}: its safe value ({reason})")
         state = self._states[name]
         self._states[name] = replace(state, value=state.safe, playing=False, problem="")
+
+    def _note_unsafe(self, name: str, reason: str, problem: str) -> None:
+        logger.error("output %s cannot be made safe (%s): %s", name, reason, problem)
+        state = self._states[name]
+        self._states[name] = replace(state, value=None, playing=False, problem=problem)
 
     def _put(self, name: str, value: float | None, dead_man: DeadMan | None) -> None:
         """Note what an output gives now; None: a waveform."""
