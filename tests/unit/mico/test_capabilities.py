@@ -54,3 +54,15 @@ def test_what_a_trajectory_may_ask_for_is_what_the_controller_takes():
         assert facts.most_steps == ABLE.most_steps
         assert facts.frequency_hz == ABLE.frequency_hz
         assert facts.amplitude_v == ABLE.amplitude_v
+
+
+def test_an_axis_whose_controller_cannot_go_as_fast_as_configured_says_so_and_does_not_move():
+    def slow(controller: ScriptedController) -> None:
+        controller.capabilities = Capabilities(
+            group_start=False, velocity=False, position_known=True, frequency_hz=(1, 2000)
+        )
+
+    with mico(("LN",), prepare=slow) as (rig, _):
+        with pytest.raises(cosmic.MoveRefused, match=r"1 to 2000 Hz.*is 5000: change it"):
+            rig["d0.c0"].move_to(1.0)
+        rig["d0.c1"].steps(10, frequency_hz=1000)

@@ -129,6 +129,8 @@ class ChannelDiscovery:
         positioner = self._context.container.positioner(channel)
         if positioner is None or not positioner.state.present:
             return
+        if self._is_too_fast(positioner.state, channel):
+            return
         controller = ChannelController(positioner, self._context)
         self.channels[channel] = controller
         if positioner.state.kind is not PositionerKind.OPEN_LOOP:
@@ -140,6 +142,20 @@ class ChannelDiscovery:
                 self._ask_safe_direction(positioner.state.address)
         controller.monitor.ask_activity()
         controller.monitor.ask_position()
+
+    def _is_too_fast(self, state: PositionerState, channel: int) -> bool:
+        """Refuse an axis whose controller cannot be set to the speed that is configured."""
+        usual_hz = self._context.settings.defaults.closed_loop_frequency_hz
+        low, high = state.frequency_range_hz
+        if state.kind is PositionerKind.OPEN_LOOP or low <= usual_hz <= high:
+            return False
+        text = (
+            f"its controller takes {low} to {high} Hz, and closed_loop_frequency_hz of "
+            f"[mico.defaults] is {usual_hz}: change it, then rescan"
+        )
+        logger.error("%s: %s", state.name, text)
+        self._context.container.update(channel, present=False, error=text)
+        return True
 
     def _ask_safe_direction(self, address: Channel) -> None:
         """Ask in which direction a reference is searched; where unknown, it may be either."""

@@ -68,9 +68,9 @@ class StepSettings(StrictModel):
     direction: Literal["forward", "backward"] | None = None
     targets_um: dict[str, float] = Field(default_factory=dict)
     targets_deg: dict[str, float] = Field(default_factory=dict)
-    steps: Annotated[int, Field(ge=1, le=29999)] | None = None
-    amplitude_v: Annotated[float, Field(ge=15, le=100)] | None = None
-    frequency_hz: Annotated[int, Field(ge=1, le=18500)] | None = None
+    steps: Annotated[int, Field(ge=1)] | None = None
+    amplitude_v: Annotated[float, Field(gt=0)] | None = None
+    frequency_hz: Annotated[int, Field(ge=1)] | None = None
     wait_s: Annotated[float, Field(gt=0, le=3600)] | None = None
     text: str = ""
 

@@ -26,7 +26,7 @@ class TeleoperationAxisSettings(StrictModel):
     direction: Literal[-1, 1] = 1
     speed_um_s: Above0 | None = None
     speed_deg_s: Above0 | None = None
-    frequency_hz: Annotated[float, Field(gt=0, le=18500)] | None = None
+    frequency_hz: Annotated[float, Field(gt=0)] | None = None
     travel_um: Above0 | None = None
     travel_deg: Above0 | None = None
 
