@@ -61,7 +61,7 @@ def stop_and_reset(rig: cosmic.Rig) -> None:
 
 def main() -> None:
     """Start the platform ten times faster than real time and use it."""
-    with cosmic.connect(rate=10) as rig:
+    with cosmic.connect(rate=10, world="plain") as rig:
         print(rig)
         print("initialising: up and away, find the references, go to the start pose")
         rig.mico.initialise(show_progress)

@@ -41,7 +41,7 @@ def be_ended(rig: cosmic.Rig) -> None:
 
 def main() -> None:
     """Do all of it on the simulated platform, at twice its speed."""
-    with cosmic.connect(applications=("mico", "daqco"), rate=2.0) as rig:
+    with cosmic.connect(applications=("mico", "daqco"), rate=2.0, world="plain") as rig:
         bring_near(rig)
         hold(rig)
         be_ended(rig)

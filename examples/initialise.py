@@ -25,7 +25,7 @@ def agree(text: str) -> bool:
 
 def main() -> None:
     """Start the simulated platform as it is at power-up and initialise it."""
-    with cosmic.connect(applications=("mico",), rate=20, cold=True) as rig:
+    with cosmic.connect(applications=("mico",), rate=20, cold=True, world="plain") as rig:
         print(f"at power-up {known(rig)}")
         try:
             rig.mico["left.x"].move_to(100.0)

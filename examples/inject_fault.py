@@ -7,7 +7,7 @@ import cosmic
 
 def main() -> None:
     """Move slowly, unplug device 0, plug it in again, and look for the devices once more."""
-    with cosmic.connect() as rig:
+    with cosmic.connect(world="plain") as rig:
         axis = rig.mico["left.x"]
         axis.set_closed_loop_frequency(500)
         movement = axis.move_to(3000.0, wait=False)

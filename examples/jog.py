@@ -8,7 +8,7 @@ import cosmic
 def main() -> None:
     """Hold a key down for half a second, then let go in two ways."""
     pause = Event()  # nobody sets it: waiting on it is a pause
-    with cosmic.connect() as rig:
+    with cosmic.connect(world="plain") as rig:
         axis = rig.mico["left.x"]
 
         with axis.jog(direction=1, speed=400.0) as jogging:

@@ -61,7 +61,7 @@ def record(rig: cosmic.Rig, file: Path) -> None:
 
 def main() -> None:
     """Do all of it on the simulated platform, twice as fast as in truth."""
-    with tempfile.TemporaryDirectory() as folder, cosmic.connect(rate=2.0) as rig:
+    with tempfile.TemporaryDirectory() as folder, cosmic.connect(rate=2.0, world="plain") as rig:
         look(rig)
         measure(rig)
         calibrate(rig)

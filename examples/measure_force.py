@@ -43,7 +43,7 @@ def be_stopped(rig: cosmic.Rig) -> None:
 
 def main() -> None:
     """Do all of it on the simulated platform, in real time."""
-    with tempfile.TemporaryDirectory() as folder, cosmic.connect() as rig:
+    with tempfile.TemporaryDirectory() as folder, cosmic.connect(world="plain") as rig:
         file = Path(folder) / "push.h5"
         push(rig, file)
         read_stiffness(file)

@@ -25,7 +25,7 @@ def main() -> None:
     """Register the class and see what the gate says."""
     TYPE_CLASSES[TYPE_CODE] = EndlessRotaryPositioner
     try:
-        with cosmic.connect(rate=10) as rig:
+        with cosmic.connect(rate=10, world="plain") as rig:
             table = rig.mico["table.rotation"]
             print(f"to 30 degrees: {table.move_to(30.0)}")
             table.move_to_end_stop("forward")

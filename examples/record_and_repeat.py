@@ -51,7 +51,7 @@ def with_mistakes(mico: Mico) -> None:
 
 def main() -> None:
     """Start the platform twenty times faster than real time and use it."""
-    with tempfile.TemporaryDirectory() as folder, cosmic.connect(rate=20) as rig:
+    with tempfile.TemporaryDirectory() as folder, cosmic.connect(rate=20, world="plain") as rig:
         mico, path = rig.mico, Path(folder) / "over-the-fibre.trajectory"
         record(mico, path)
         trajectory = mico.trajectories.load(path)

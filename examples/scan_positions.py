@@ -11,7 +11,7 @@ ROWS_UM = (-50.0, 0.0, 50.0)
 def main() -> None:
     """Ask the gate about every position first, so that nothing starts that cannot end."""
     positions = [{"probe.x": x, "probe.y": y} for y, x in product(ROWS_UM, COLUMNS_UM)]
-    with cosmic.connect(rate=20) as rig:
+    with cosmic.connect(rate=20, world="plain") as rig:
         for position in positions:
             verdict = rig.mico.check(position)
             if not verdict.allowed:

@@ -82,7 +82,7 @@ def main() -> None:
     # A plan that fails is told below, in a line; bluesky's log would have its traceback.
     logging.getLogger("bluesky").setLevel(logging.CRITICAL)
     engine = RunEngine({})
-    with tempfile.TemporaryDirectory() as folder, cosmic.connect(rate=5) as rig:
+    with tempfile.TemporaryDirectory() as folder, cosmic.connect(rate=5, world="plain") as rig:
         approach(rig)
         rehearse("push", push(rig))
         rehearse("into the probe", into_the_probe(rig))

@@ -9,7 +9,7 @@ from cosmic.frame.errors import CosmicError
 
 RECORDING = Path(__file__).with_name("gamepad.csv")
 
-with cosmic.connect(applications=("mico",)) as rig:
+with cosmic.connect(applications=("mico",), world="plain") as rig:
     steering = rig.mico.teleoperation
     pads = [info for info in steering.devices() if info.kind in ("gamepad", "joystick")]
     device = pads[0].key if "--pad" in sys.argv and pads else f"recorded:{RECORDING}"

@@ -16,7 +16,7 @@ from cosmic.mico.core.motion.messages import PositionChanged
 def main() -> None:
     """Print the positions that are read while two axes move slowly."""
     heard: SimpleQueue[PositionChanged] = SimpleQueue()
-    with cosmic.connect() as rig:
+    with cosmic.connect(world="plain") as rig:
         for commander in {axis.commander for axis in rig.mico}:  # one for each device
             commander.position_changed.connect(heard.put, Qt.ConnectionType.DirectConnection)
         for name in ("left.x", "right.y"):

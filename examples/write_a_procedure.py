@@ -128,7 +128,7 @@ def show(event: NodeEvent) -> None:
 
 def main() -> None:
     """Run it on the simulated platform, ten times as fast as in life."""
-    with cosmic.connect(applications=("mico", "daqco"), rate=10.0) as rig:
+    with cosmic.connect(applications=("mico", "daqco"), rate=10.0, world="plain") as rig:
         work = Work(rig, positions_um=[3600.0, 3500.0, 3400.0])
         run = rig.procedure(scan(), work)
         run.subscribe(show)

@@ -19,6 +19,8 @@ from hypothesis import settings
 
 from cosmic.frame.threads import running_threads
 
+# A simulated platform is the plain twin unless a test names a world, in this process and in others.
+os.environ["COSMIC_WORLD"] = "plain"
 if "COSMIC_TEST_DISPLAY" not in os.environ:
     os.environ["QT_QPA_PLATFORM"] = "offscreen"
 

@@ -56,6 +56,14 @@ class ToolOffsets:
         """Whether no tool is anywhere else than drawn."""
         return not self._mounted and not self._bent
 
+    @property
+    def fastest_um_s(self) -> float | None:
+        """How fast a tool drifts at most; None while a tip is bent."""
+        if self._bent:
+            return None
+        ways = self._drift.values()
+        return max((math.hypot(*way) * rate for way, rate, _ in ways), default=0.0)
+
     def bend(self, tool: str, offset_um: Point) -> None:
         """Have the tip of a tool bent by so much; zeros end it."""
         bent = {name: each for name, each in self._bent.items() if name != tool}
