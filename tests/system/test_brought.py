@@ -245,3 +245,53 @@ def test_its_procedure_is_named_in_a_recipe(laboratory: Edit, tmp_path: Path) ->
     recipe.write_text(shipped.replace('"transport"', '"lok"', 1), encoding="utf-8")
     with pytest.raises(cosmic.ConfigError, match=r"there is no procedure 'lok'; known: .*look"):
         read_recipe(recipe)
+
+
+BROKEN = """
+[cosmic.boards]
+broken = no_such_package:BACKEND
+[cosmic.controllers]
+broken = no_such_package:BACKEND
+"""
+
+
+@pytest.fixture
+def with_broken(tmp_path: Path, laboratory: Edit, monkeypatch: pytest.MonkeyPatch) -> Edit:
+    described = tmp_path / "brokenware" / "brokenware-0.3.dist-info"
+    described.mkdir(parents=True)
+    (described / "METADATA").write_text("Name: brokenware\nVersion: 0.3\n", encoding="utf-8")
+    (described / "entry_points.txt").write_text(BROKEN, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(described.parent))
+    return laboratory
+
+
+def test_boards_that_cannot_be_loaded_leave_the_axes_alone(with_broken: Edit) -> None:
+    folder = with_broken(
+        ('[daqco]\nbackend = "simulated"', '[daqco]\nbackend = "broken"'),
+        (APPLICATIONS, 'applications = ["mico", "daqco"]'),
+    )
+    with cosmic.connect(folder, rate=1.0) as rig:
+        assert rig.mico["left.x"].move_by(5.0) is not None
+        with pytest.raises(cosmic.CosmicError, match=r"brokenware 0\.3.*no_such_package"):
+            rig.daqco.start()
+
+
+def test_a_controller_that_cannot_be_loaded_leaves_the_others_alone(
+    with_broken: Edit, caplog: pytest.LogCaptureFixture
+) -> None:
+    folder = with_broken(
+        (
+            "[mico.defaults]",
+            '[[mico.controller]]\nbackend = "broken"\nserials = ["B-1"]\n\n[mico.defaults]',
+        ),
+    )
+    with cosmic.connect(folder, applications=("mico",)) as rig:
+        assert rig.mico["left.x"].move_by(5.0) is not None
+        assert not rig.simulated, "nobody knows what the broken one would have moved"
+    assert "controller 'broken' of brokenware 0.3" in caplog.text
+
+
+def test_the_only_controller_that_cannot_be_loaded_is_named(with_broken: Edit) -> None:
+    folder = with_broken(('[mico]\nbackend = "simulated" ', '[mico]\nbackend = "broken" '))
+    with pytest.raises(cosmic.NotConnectedError, match=r"brokenware 0\.3.*no_such_package"):
+        cosmic.connect(folder, applications=("mico",))
