@@ -74,6 +74,7 @@ from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.move_status import MoveStatus
 from cosmic.mico.api.poses import Poses
 from cosmic.mico.api.stepwise import StepwiseMove
+from cosmic.mico.api.tools import Tool
 from cosmic.mico.api.trajectories import Trajectories
 from cosmic.mico.api.trajectory_places import AwayFromStartError
 from cosmic.mico.api.trajectory_player import TrajectoryPlayer
@@ -107,6 +108,7 @@ CLASSES: Final[dict[str, type]] = {
     "StationControl": StationControl,
     "Mico": Mico,
     "Collision": Collision,
+    "Tool": Tool,
     "Approach": Approach,
     "PlannedPath": PlannedPath,
     "Link": Link,

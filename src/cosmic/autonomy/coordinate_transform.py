@@ -149,12 +149,29 @@ class PlatformTransform(CoordinateTransform):
         if tip is None:
             raise NotAvailable(f"{what}: its position is unknown; initialise the platform")
         x_um, y_um = self.map_of(image, tip[2], what).to_um(point_px).tolist()
-        motions: dict[str, SentMotion] = {
-            axis: MoveTo(target, "um") for axis, target in axis_targets(tool, x_um, y_um).items()
-        }
+        motions = self._reaching(tool, (x_um, y_um, tip[2]))
         self._mico.begin_together(motions, source=SOURCE)
         logger.info("click: %s to %.1f, %.1f um", what, x_um, y_um)
         return f"{tool.shown} moves to x {x_um:.1f}, y {y_um:.1f} µm"
+
+    def _reaching(
+        self, tool: ToolSettings, point_um: tuple[float, float, float]
+    ) -> dict[str, SentMotion]:
+        """Return what brings a tool over a point: by the scene, where that has the tool.
+
+        Raises
+        ------
+        MoveRefused
+            The point cannot be reached.
+        """
+        try:
+            in_scene = tool.name in self._mico.tools
+        except NotAvailable:
+            in_scene = False
+        if in_scene:
+            return self._mico.tools[tool.name].motions(point_um)
+        targets = axis_targets(tool, *point_um[:2])
+        return {axis: MoveTo(target, "um") for axis, target in targets.items()}
 
     def expected_tools(self, image: CameraImage) -> Mapping[str, ExpectedTool]:
         """Return where the tips should be on an image; those that cannot be told are missing."""

@@ -15,6 +15,7 @@ from cosmic.mico.core.collision.scene_settings import (
     MarginSettings,
     SceneSettings,
     SizeLimits,
+    ToolFrameSettings,
 )
 from system.config_tables import rows
 from system.docs_blocks import ROOT, blocks, table_rows
@@ -22,12 +23,13 @@ from system.docs_blocks import ROOT, blocks, table_rows
 PAGE = ROOT / "docs" / "how-to" / "describe-your-platform.md"
 REFERENCE = ROOT / "docs" / "reference" / "scene.md"
 
-TOP = {name: SceneSettings.model_fields[name] for name in ("urdf", "srdf", "margin_um")}
+TOP = {name: SceneSettings.model_fields[name] for name in ("urdf", "srdf", "margin_um", "plate")}
 SECTIONS: dict[str, type[BaseModel]] = {
     "scene": create_model("Top", **{name: (f.annotation, f) for name, f in TOP.items()}),
     "[[drive]]": DriveSettings,
     "[[margin]]": MarginSettings,
     "[[contact]]": ContactSettings,
+    "[[tool]]": ToolFrameSettings,
     "[limits]": SizeLimits,
 }
 

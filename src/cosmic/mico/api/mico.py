@@ -48,6 +48,7 @@ from cosmic.mico.api.news import (
     follow_positions,
 )
 from cosmic.mico.api.poses import Poses
+from cosmic.mico.api.tools import Tools
 from cosmic.mico.api.trajectories import Trajectories
 from cosmic.mico.api.trajectory_recording import Recordings
 from cosmic.mico.api.ways import PlannedPath
@@ -918,6 +919,16 @@ class Mico(Declared):
         if model is None or not model.available:
             raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the platform file")
         return Collision(self._manager, model, self._source)
+
+    @property
+    def scene_model(self) -> SceneModel:
+        """What is watched for collisions; raises `NotAvailable` without a scene."""
+        return self.collision.scene
+
+    @property
+    def tools(self) -> Tools:
+        """The tools of the scene by name, moved in space whatever angle they stand at."""
+        return Tools(self, self._source)
 
     def clearance(self) -> Approach:
         """Return the nearest pair of bodies: `bodies`, `distance_um`, `place_um`.

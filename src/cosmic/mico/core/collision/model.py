@@ -128,6 +128,21 @@ class Contact:
 
 
 @dataclass(frozen=True, eq=False)
+class ToolFrame:
+    """Where the working point of a tool is, and which way it looks.
+
+    Attributes
+    ----------
+    body_from_tool : ndarray, shape (4, 4), float64, um
+        Its origin is the tool centre point.
+    """
+
+    name: str
+    body: str
+    body_from_tool: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class SceneModel:
     """Everything the gate, the planner and the 3D view need to know.
 
@@ -145,6 +160,10 @@ class SceneModel:
         Position of axes, in their unit, where nothing is in anybody's way.
     detour_height : mapping of float
         Position of lifting axes, in their unit, at which the others travel freely.
+    tools : tuple of ToolFrame
+        What has a working point.
+    plate : str
+        The body on which samples lie; empty: none is named.
     """
 
     name: str
@@ -158,6 +177,8 @@ class SceneModel:
     contacts: tuple[Contact, ...] = ()
     park: Mapping[str, float] = field(default_factory=dict)
     detour_height: Mapping[str, float] = field(default_factory=dict)
+    tools: tuple[ToolFrame, ...] = ()
+    plate: str = ""
 
     @cached_property
     def axes(self) -> tuple[str, ...]:

@@ -1,23 +1,28 @@
 """A scene read from its files and checked: the one way from TOML, URDF, SRDF and meshes."""
 
+import math
+from collections.abc import Collection, Sequence
 from pathlib import Path
+
+import numpy as np
 
 from cosmic.frame.config import load_model
 from cosmic.frame.errors import ConfigError
-from cosmic.mico.core.collision.model import SceneModel, Shape
+from cosmic.mico.core.collision.model import SceneModel, Shape, ToolFrame
 from cosmic.mico.core.collision.scene_checks import check_model
 from cosmic.mico.core.collision.scene_drives import make_drives
 from cosmic.mico.core.collision.scene_files import SceneFiles
 from cosmic.mico.core.collision.scene_findings import Findings
 from cosmic.mico.core.collision.scene_pairs import Pairing
-from cosmic.mico.core.collision.scene_settings import SceneSettings
+from cosmic.mico.core.collision.scene_settings import SceneSettings, ToolFrameSettings
 from cosmic.mico.core.collision.scene_shapes import ShapeMaker
 from cosmic.mico.core.collision.scene_tree import order_joints
-from cosmic.mico.core.collision.scene_urdf import Description, LinkText, understand
+from cosmic.mico.core.collision.scene_urdf import Description, LinkText, turned, understand
 from cosmic.mico.core.collision.scene_xml import (
     XmlFile,
     check_urdf_text,
     read_disabled,
+    read_end_effectors,
     read_xml,
 )
 
@@ -63,6 +68,7 @@ class _Reading:
         files = SceneFiles(folder, limits.file_bytes, settings.sha256, self._findings)
         srdf = read_xml(folder / settings.srdf, files, f"{self._path}: srdf", self._findings)
         disabled = [] if srdf is None else read_disabled(srdf, self._findings)
+        named = [] if srdf is None else read_end_effectors(srdf, self._findings)
         urdf, described = self._describe(folder / settings.urdf, files, f"{self._path}: urdf")
         if urdf is None or described is None:
             return None
@@ -87,9 +93,37 @@ class _Reading:
             contacts=pairing.contacts(settings, watched, self._path),
             park=settings.park,
             detour_height=settings.detour,
+            tools=self._tools(settings, named, bodies),
+            plate=self._plate(settings, bodies),
         )
         check_model(model, settings, self._path, self._findings)
         return model
+
+    def _tools(
+        self,
+        settings: SceneSettings,
+        named: Sequence[tuple[str, str]],
+        bodies: Collection[str],
+    ) -> tuple[ToolFrame, ...]:
+        """Return the tools of the SRDF, and those of the scene, which replace them by name."""
+        tools: dict[str, ToolFrame] = {}
+        described = [ToolFrameSettings(name=name, link=link) for name, link in named]
+        for tool in (*described, *settings.tool):
+            if tool.link not in bodies:
+                where = f"{self._path}: tool {tool.name!r}"
+                self._findings.wrong(where, f"{tool.link!r} is no link of the URDF")
+                continue
+            frame = np.eye(4)
+            frame[:3, :3] = turned(*(math.radians(each) for each in tool.rpy_deg))
+            frame[:3, 3] = tool.tip_um
+            tools[tool.name] = ToolFrame(tool.name, tool.link, frame)
+        return tuple(tools.values())
+
+    def _plate(self, settings: SceneSettings, bodies: Collection[str]) -> str:
+        if settings.plate and settings.plate not in bodies:
+            text = f"{settings.plate!r} is no link of the URDF"
+            self._findings.wrong(f"{self._path}: plate", text)
+        return settings.plate
 
     def _describe(
         self, path: Path, files: SceneFiles, asked_by: str

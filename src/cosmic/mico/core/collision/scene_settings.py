@@ -45,6 +45,15 @@ class ContactSettings(StrictModel):
     reason: Annotated[str, Field(min_length=1)]
 
 
+class ToolFrameSettings(StrictModel):
+    """The working point of a tool: `tip_um` in the frame of `link`, turned against it."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+    link: str
+    tip_um: Annotated[tuple[float, float, float], Field(strict=False)] = (0.0, 0.0, 0.0)
+    rpy_deg: Annotated[tuple[float, float, float], Field(strict=False)] = (0.0, 0.0, 0.0)
+
+
 class SizeLimits(StrictModel):
     """What is taken for a mistake because of its size."""
 
@@ -67,6 +76,8 @@ class SceneSettings(StrictModel):
     contact: Annotated[tuple[ContactSettings, ...], Field(strict=False)] = ()
     park: dict[str, float] = Field(default_factory=dict)
     detour: dict[str, float] = Field(default_factory=dict)
+    tool: Annotated[tuple[ToolFrameSettings, ...], Field(strict=False)] = ()
+    plate: str = ""
     exchange: dict[str, str] = Field(default_factory=dict)
     sha256: dict[str, str] = Field(default_factory=dict)
     limits: SizeLimits = SizeLimits()

@@ -165,7 +165,7 @@ def _pose_um_from_m(origin: Any) -> Floats:
     place_m = np.array(_numbers(origin, "xyz", "0 0 0"))
     pose[:3, 3] = np.round(place_m * _UM_PER_M, 6)
     turn = pose[:3, :3]
-    turn[:] = _turned(*_numbers(origin, "rpy", "0 0 0"))
+    turn[:] = turned(*_numbers(origin, "rpy", "0 0 0"))
     # A quarter turn leaves sines of 1e-16, which would tilt what is meant to be aligned.
     nearest = np.round(turn)
     close = np.abs(turn - nearest) < 1e-12
@@ -173,8 +173,8 @@ def _pose_um_from_m(origin: Any) -> Floats:
     return pose
 
 
-def _turned(roll: float, pitch: float, yaw: float) -> Floats:
-    """Return the rotation about the fixed axes x, y, z, one after the other."""
+def turned(roll: float, pitch: float, yaw: float) -> Floats:
+    """Return the rotation about the fixed axes x, y, z, one after the other, in radians."""
     (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
     return np.array(
         [

@@ -133,8 +133,11 @@ def read_disabled(file: XmlFile, findings: Findings) -> list[Disabled]:
     found = []
     for element in file.root:
         where = file.at(element)
+        if element.tag == "end_effector":
+            continue
         if element.tag != "disable_collisions":
-            findings.odd(where, f"<{element.tag}> is not used, only <disable_collisions>")
+            text = "is not used, only <disable_collisions> and <end_effector>"
+            findings.odd(where, f"<{element.tag}> {text}")
             continue
         one, other = element.get("link1", ""), element.get("link2", "")
         reason = element.get("reason", "").strip()
@@ -144,6 +147,20 @@ def read_disabled(file: XmlFile, findings: Findings) -> list[Disabled]:
             findings.wrong(where, f"{one} and {other} may touch, but no reason is given; say why")
         else:
             found.append(Disabled((one, other), reason, where))
+    return found
+
+
+def read_end_effectors(file: XmlFile, findings: Findings) -> list[tuple[str, str]]:
+    """Return name and link of the tools that an SRDF names; the link is their frame."""
+    found = []
+    for element in file.root:
+        if element.tag != "end_effector":
+            continue
+        name, link = element.get("name", ""), element.get("parent_link", "")
+        if name and link:
+            found.append((name, link))
+        else:
+            findings.wrong(file.at(element), "<end_effector> needs name and parent_link")
     return found
 
 
