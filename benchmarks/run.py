@@ -30,6 +30,7 @@ LONG = frozenset(
         "collision_oracles",
         "full_soak",
         "soak",
+        "worlds",
     }
 )
 """Commands of their own: each takes from ten minutes to hours."""

@@ -300,6 +300,10 @@ TOO_SHORT: Final = "too short"
 NOT_TRUSTED: Final = "not trusted"
 
 
+GUESSED_FROM: Final = 2
+"""Spans from which the next ones are planned: more change the plan by nothing that counts."""
+
+
 class PushSpans(FibreOperation):
     """All spans of one grasp, the longest first; each one makes the plan of the next better."""
 
@@ -337,7 +341,9 @@ class PushSpans(FibreOperation):
                 break
             yield from OneSpan(work, fibre, plan[0]).steps()
             width = push.fit.model_copy(update={"fibre_width_um": fibre.width_um})
-            fibre.ei_guess_n_m2 = guess_ei(fibre.spans, settings=width) or fibre.ei_guess_n_m2
+            if len(fibre.spans) <= GUESSED_FROM:
+                guessed = guess_ei(fibre.spans, settings=width)
+                fibre.ei_guess_n_m2 = guessed or fibre.ei_guess_n_m2
             yield SAFE_POINT
 
 

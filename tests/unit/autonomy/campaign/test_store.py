@@ -4,6 +4,7 @@ import errno
 import os
 import resource
 import signal
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -58,6 +59,36 @@ def test_what_is_written_is_read_back_whole(store: CampaignStore) -> None:
     assert read.images[0].scale_um_px == 7.6
     assert read.images[0].region_px == record.images[0].region_px
     assert {each.name: each.unit for each in read.series} == {"left.x": "um", "force": "uN"}
+
+
+def test_the_budget_of_a_fibre_is_read_back(store: CampaignStore) -> None:
+    record = good(store.begin_fibre(time_s=0.0))
+    store.finish_fibre(record)
+    found = store.reader.fibre(record.number).bending
+    assert found is not None
+    assert record.bending is not None
+    assert found.budget == record.bending.budget
+    assert found.notes == record.bending.notes
+    assert not found.scale_verified
+
+
+def test_a_campaign_of_an_earlier_program_is_resumed_without_a_budget(tmp_path: Path) -> None:
+    with CampaignStore.create(tmp_path / "old", INFO) as store:
+        store.finish_fibre(good(store.begin_fibre(time_s=0.0)))
+    with sqlite3.connect(tmp_path / "old" / "campaign.sqlite") as connection:
+        for column in ("budget_json", "scale_verified", "notes"):
+            connection.execute(f"ALTER TABLE fibre DROP COLUMN {column}")
+    connection.close()
+    before = CampaignReader(tmp_path / "old").finished()[0].bending
+    assert before is not None
+    assert before.budget == ()
+    with CampaignStore.open(tmp_path / "old") as store:
+        store.finish_fibre(good(store.begin_fibre(time_s=10.0)))
+        first, second = (each.bending for each in store.reader.finished())
+    assert first is not None
+    assert second is not None
+    assert not first.budget
+    assert second.budget
 
 
 def test_a_failed_fibre_keeps_its_cause_and_its_tries(store: CampaignStore) -> None:
