@@ -177,10 +177,11 @@ def test_a_card_shows_image_curves_and_numbers(card: FibreCard, qtbot: QtBot) ->
     assert (card.image.shown.width(), card.image.shown.height()) == (320, 240)
     card.images.setCurrentText("held")
     assert (card.image.shown.width(), card.image.shown.height()) == (80, 60)
-    assert len(card.curves.labels) == 3
+    assert len(card.curves.labels) == len(record.spans)
     texts = _texts(card)
     assert any(" to " in text and "N m²" in text for text in texts)
-    assert sum("±" in text for text in texts) == 5, "length, clamp, and three spans"
+    assert sum("±" in text for text in texts) == 2 + len(record.spans), "length, clamp, spans"
+    assert any("Force scale not verified." in text for text in texts)
     replayed: list[int] = []
     card.replay_requested.connect(replayed.append)
     qtbot.mouseClick(card.replay, LEFT)

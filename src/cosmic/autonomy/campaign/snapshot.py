@@ -15,6 +15,8 @@ from cosmic.autonomy.campaign.statistics import CampaignProgress, MeanEi, mean_e
 
 Mask = npt.NDArray[np.bool_]
 
+MOST_CONTRIBUTIONS: Final = 4
+LEAST_SHARE: Final = 0.03
 MOST_CURVE_POINTS: Final = 2000
 
 
@@ -198,6 +200,8 @@ class FibreCardData:
         Nan where it was not measured.
     flags, doubts : tuple of str
         What makes the result doubtful, in a few words and in sentences.
+    uncertainty : str
+        Where its interval comes from, and whether the scale of the force is verified.
     curves : tuple of SpanCurve
         Its spans.
     images : tuple of FibreImage
@@ -219,6 +223,7 @@ class FibreCardData:
     attempts: int = 1
     flags: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    uncertainty: str = ""
     curves: tuple[SpanCurve, ...] = ()
     images: tuple[FibreImage, ...] = ()
     failures: tuple[tuple[str, str], ...] = ()
@@ -241,10 +246,23 @@ def card_of(record: FibreRecord) -> FibreCardData:
         attempts=record.attempts,
         flags=() if result is None else tuple(sorted(str(each) for each in result.flags)),
         doubts=() if result is None else result.reasons,
+        uncertainty=_uncertainty(result),
         curves=span_curves(record, most_points=MOST_CURVE_POINTS),
         images=record.images,
         failures=tuple((each.name, each.cause) for each in record.operations if each.failed),
     )
+
+
+def _uncertainty(result: BendingResult | None) -> str:
+    if result is None or not result.budget:
+        return ""
+    largest = ", ".join(
+        f"{line.source} {100.0 * line.share:.0f} %"
+        for line in result.budget[:MOST_CONTRIBUTIONS]
+        if line.share >= LEAST_SHARE
+    )
+    scale = "verified by a standard" if result.scale_verified else "not verified"
+    return f"Interval: {largest}. Force scale {scale}."
 
 
 def span_curves(record: FibreRecord, *, most_points: int | None = None) -> tuple[SpanCurve, ...]:

@@ -81,6 +81,8 @@ def test_a_card_has_curves_from_the_first_contact_without_their_baseline() -> No
         assert curve.loading.sum() == span.loading.sum()
     assert any(curve.used for curve in card.curves)
     assert card.clamp_offset_um == record.bending.clamp_offset_um
+    assert card.uncertainty.startswith("Interval: ")
+    assert card.uncertainty.endswith("Force scale not verified.")
 
 
 def test_a_span_that_was_not_fitted_is_shown_all_the_same() -> None:

@@ -311,7 +311,8 @@ class FibreCard(QWidget):
         _fill(self.numbers, [[name, text] for name, text in _numbers(card)])
         _fill(self.spans, _span_rows(card.curves))
         flags = f"Doubtful: {', '.join(card.flags)}." if card.flags else ""
-        _say(self.doubts, "\n".join(part for part in (flags, *card.doubts) if part))
+        parts = (flags, *card.doubts, card.uncertainty)
+        _say(self.doubts, "\n".join(part for part in parts if part))
         failed = [f"{name}: {cause}" for name, cause in card.failures]
         _say(self.failures, "Failed operations: " + ", ".join(failed) if failed else "")
 
