@@ -185,4 +185,4 @@ def test_a_replay_goes_from_the_first_to_the_last_position_of_every_axis() -> No
 
 def test_automatic_mode_is_offered_only_where_all_that_it_needs_runs() -> None:
     assert ACM not in blocked_modes(mico=True, model=True, campaigns=True)
-    assert "ViCo" in blocked_modes(mico=True, model=True, campaigns=False)[ACM]
+    assert "cameras" in blocked_modes(mico=True, model=True, campaigns=False)[ACM]

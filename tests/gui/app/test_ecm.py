@@ -45,7 +45,7 @@ def mode_button(window: OperatorWindow, mode: str) -> QToolButton:
     return next(
         button
         for button in window.top_bar.findChildren(QToolButton, "modeButton")
-        if button.text() == mode
+        if button.property("mode") == mode
     )
 
 
@@ -94,7 +94,7 @@ def test_in_mcm_a_blocked_move_is_refused_with_a_hint(window: OperatorWindow, qt
     go_to(window, qtbot, "2000")
     qtbot.waitUntil(lambda: bool(reason(window)))
     assert "right_" in reason(window)
-    assert "In mode ECM a detour can be planned" in reason(window)
+    assert "In mode Guided a detour can be planned" in reason(window)
     assert bar(window).state is PreviewState.NONE
     assert position(card(window, "left.y")) == pytest.approx(-2000.0, abs=1.0)
 
@@ -104,7 +104,7 @@ def test_a_refusal_that_no_detour_would_help_has_no_hint(
 ) -> None:
     go_to(window, qtbot, "9 m")
     qtbot.waitUntil(lambda: bool(reason(window)))
-    assert "ECM" not in reason(window)
+    assert "Guided" not in reason(window)
 
 
 def test_in_ecm_a_detour_is_offered_and_driven_after_go(
@@ -191,7 +191,7 @@ def test_without_a_path_it_says_what_blocks(blocked: OperatorWindow, qtbot: QtBo
     assert "No detour for left.z to -3000" in shown.text
     assert "plate" in shown.text
     assert "plate" in reason(blocked, "left.z")
-    assert "ECM" not in reason(blocked, "left.z")
+    assert "Guided" not in reason(blocked, "left.z")
     assert "plate" in scene(blocked, qtbot).refused_text
     assert scene(blocked, qtbot).content.ghosts
     assert not part(shown, "pathGo", QPushButton).isVisible()
@@ -318,7 +318,7 @@ def test_the_mode_is_kept_shown_and_logged(
     window = make()
     with caplog.at_level(logging.INFO, logger="cosmic.app"):
         choose_mode(window, qtbot, "ECM")
-    assert "control mode ECM (was MCM)" in caplog.text
+    assert "control mode Guided (was Manual)" in caplog.text
     assert mode_button(window, "ECM").isChecked()
     assert not mode_button(window, "MCM").isChecked()
     window.close()

@@ -38,7 +38,7 @@ def test_a_fibre_is_measured_and_a_gripper_calibrated_and_sent_to_a_pixel(
     lens = window.findChild(LensPanel)
     views = {each.windowTitle(): each for each in window.findChildren(CameraView)}
     view = views["Microscope"]
-    window.raise_panel("Camera settings")
+    window.raise_panel("Camera")
     window.raise_panel("Microscope")
     vico, mico = window.platform.vico, window.platform.mico
     assert lens is not None
@@ -53,7 +53,7 @@ def test_a_fibre_is_measured_and_a_gripper_calibrated_and_sent_to_a_pixel(
     qtbot.mouseClick(lens.steps["2x"], LEFT)
     qtbot.waitUntil(lambda: zoom(api) == pytest.approx(2.0, abs=1e-3), timeout=15_000)
 
-    window.raise_panel("Camera settings")
+    window.raise_panel("Camera")
     tick(qtbot, view.chain.ticks["fibres"])
     assert view.chain.ticks["fibres"].isChecked()
 

@@ -291,7 +291,7 @@ def test_a_controller_that_is_not_there_greys_the_panel_until_a_rescan(
 ) -> None:
     controller = Deaf(("LLN",))
     window = make(scripted_platform(controller), hardware=False)
-    dock = window.dock("MiCo")
+    dock = window.dock("Axes")
     window.open_hardware()
     qtbot.waitUntil(lambda: "no device answers" in dock.failure)
     assert "no device answers" in window.top_bar.message

@@ -69,7 +69,7 @@ def test_on_a_small_screen_every_card_shows_the_button_that_halts_its_axis(
     screen(SMALL)
     window = make(hardware=False, size=(2040, 1137))
     qtbot.waitUntil(lambda: on(SMALL, window), timeout=5000)
-    dock = window.dock("MiCo")
+    dock = window.dock("Axes")
     areas = [each for each in dock.findChildren(QScrollArea) if each.isVisible()]
     qtbot.waitUntil(lambda: not any(each.horizontalScrollBar().maximum() for each in areas))
     for card in mico(window).cards.values():
@@ -136,8 +136,8 @@ def test_no_panel_forces_the_window_beyond_a_small_screen(make: Make) -> None:
     for dock in window.findChildren(QDockWidget):
         dock.show()
         dock.raise_()
-    window.set_failed("MiCo", "a long reason why the device cannot be reached " * 5)
+    window.set_failed("Axes", "a long reason why the device cannot be reached " * 5)
     QApplication.processEvents()
     assert window.minimumSizeHint().width() <= 1024
     assert all(each.minimumSizeHint().height() <= 568 for each in window.findChildren(QDockWidget))
-    assert Qt.DockWidgetArea.LeftDockWidgetArea == window.dockWidgetArea(window.dock("MiCo"))
+    assert Qt.DockWidgetArea.LeftDockWidgetArea == window.dockWidgetArea(window.dock("Axes"))

@@ -230,7 +230,7 @@ def test_a_stop_is_shown_beside_the_tool_and_the_coach_resets_it(
     assert "STOPPED" not in tasks(whole).tool.line.text()
 
 
-def test_the_force_is_told_with_its_limit_and_greyed_when_it_is_not_measured(
+def test_the_force_is_shown_with_its_limit_and_greyed_when_it_is_not_measured(
     whole: OperatorWindow, qtbot: QtBot
 ) -> None:
     choose(whole, qtbot, MEASURE)

@@ -152,7 +152,14 @@ def test_the_rate_is_shown_where_it_is_not_one(bar: TopBar) -> None:
 
 
 def test_only_manual_mode_can_be_chosen_and_the_others_say_why(qtbot: QtBot, bar: TopBar) -> None:
-    buttons = {each.text(): each for each in bar.findChildren(QToolButton)}
+    buttons = {each.property("mode"): each for each in bar.findChildren(QToolButton)}
+    assert [buttons[each].text() for each in ("MCM", "SCM", "ECM", "ACM")] == [
+        "Manual",
+        "Replay",
+        "Guided",
+        "Automatic",
+    ]
+    assert "ECM" in buttons["ECM"].toolTip()
     assert buttons["MCM"].isChecked()
     for name in ("SCM", "ECM", "ACM"):
         assert not buttons[name].isEnabled()

@@ -256,7 +256,7 @@ class ForcePanel(QWidget):
         self.mark = styled(named(push_button("Mark", "Write a mark (Ctrl+M)"), "mark"), "narrow")
         self.mark.setShortcut("Ctrl+M")
         self.mark.clicked.connect(self._on_mark)
-        self.told = named(ElidedLabel(), "forceTold")
+        self.message = named(ElidedLabel(), "forceMessage")
 
     def _curve_button(self, text: str, page: int) -> QPushButton:
         button = styled(push_button(text, f"Force {text}"), "narrow")
@@ -294,7 +294,7 @@ class ForcePanel(QWidget):
         for widget in (head, self.bar, limit, which):
             column.addWidget(widget)
         column.addWidget(self.curves, 1)
-        for widget in (names, buttons, self.told):
+        for widget in (names, buttons, self.message):
             column.addWidget(widget)
 
     # What is shown
@@ -433,14 +433,14 @@ class ForcePanel(QWidget):
         value = self._mean()
         scale = self._daqco.scales.get(self._channel)
         if value is None or self._age_s() or scale is None:
-            self._tell("Tare needs a force that is measured now", refused=True)
+            self._say("Tare needs a force that is measured now", refused=True)
             return
         limit = self._limit_in_force()
         sides = (limit.settings.low, limit.settings.high) if limit is not None else ()
         least = min((abs(each) for each in sides if each is not None), default=math.inf)
         if abs(value) > TARE_SHARE * least:
             text = f"{value:.0f} is a load, no zero: take the tool off the fibre first"
-            self._tell(text, refused=True)
+            self._say(text, refused=True)
             return
         first, *rest = scale.coefficients
         zeroed = Scale(scale.name, scale.unit, (first - value, *rest))
@@ -448,16 +448,16 @@ class ForcePanel(QWidget):
             lambda: self._daqco.set_scale(self._channel, zeroed), f"zero moved by {value:.1f}"
         )
 
-    def _ask(self, action: Callable[[], T], told: str, *, slow: bool = False) -> None:
+    def _ask(self, action: Callable[[], T], said: str, *, slow: bool = False) -> None:
         def done(_result: T | None, error: CosmicError | None) -> None:
-            self._tell(str(error) if error is not None else told, refused=error is not None)
+            self._say(str(error) if error is not None else said, refused=error is not None)
             self._on_changed()
 
         self._asking.ask(action, done, slow=slow)
 
-    def _tell(self, text: str, *, refused: bool = False) -> None:
+    def _say(self, text: str, *, refused: bool = False) -> None:
         self._error = text if refused else ""
-        self.told.set_text(f"{state_look(State.REFUSED).glyph} {text}" if refused else text)
+        self.message.set_text(f"{state_look(State.REFUSED).glyph} {text}" if refused else text)
 
     # Recording
 
@@ -467,7 +467,7 @@ class ForcePanel(QWidget):
             path = self._daqco.recording.path
 
             def closed(_result: object, error: CosmicError | None) -> None:
-                self._tell(str(error) if error else f"written: {path.name if path else ''}")
+                self._say(str(error) if error else f"written: {path.name if path else ''}")
                 if error is None and path is not None:
                     self.written.emit(path)
 
@@ -477,7 +477,7 @@ class ForcePanel(QWidget):
         try:
             folder = self._daqco.directory if self._daqco.remote else self._folder()
         except OSError as exc:
-            self._tell(str(exc), refused=True)
+            self._say(str(exc), refused=True)
             return
         base = self.name.text()
         self._asking.ask(
@@ -486,7 +486,7 @@ class ForcePanel(QWidget):
 
     def _on_named(self, found: NamedFile | None, error: CosmicError | None) -> None:
         if found is None:
-            self._tell(str(error), refused=True)
+            self._say(str(error), refused=True)
             return
         note = self.note.text().strip()
 

@@ -50,15 +50,18 @@ class ImageBar(QWidget):
         Image and scene are to change places; the whole image is to be seen.
     inset_toggled(bool)
         The inset is to be shown, or not.
-    told(str)
+    reported(str)
         Why something was refused.
+    move_toggled(bool)
+        A click on the image is to move the chosen tool, or not.
     """
 
     camera_chosen = Signal(str)
+    move_toggled = Signal(bool)
     swap_requested = Signal()
     fit_requested = Signal()
     inset_toggled = Signal(bool)
-    told = Signal(str)
+    reported = Signal(str)
 
     def __init__(self, vico: Vico, exposures: dict[str, QWidget]) -> None:
         super().__init__()
@@ -112,6 +115,10 @@ class ImageBar(QWidget):
         self.light.valueChanged.connect(self._on_light)
 
     def _make_view_buttons(self) -> None:
+        self.click_move = named(_button("⌖ Move", ""), "barMove")
+        self.click_move.setCheckable(True)
+        self.click_move.clicked.connect(self.move_toggled)
+        self.show_move("nothing is calibrated yet", "")
         self.fit = _button("Fit", "Show the whole image")
         self.fit.clicked.connect(self.fit_requested)
         self.inset = named(_button("▣", "Show the other picture as inset"), "barInset")
@@ -138,7 +145,7 @@ class ImageBar(QWidget):
         ):
             row.addWidget(widget)
         row.addWidget(self._exposures, 1)
-        for button in (self.fit, self.inset, self.swap):
+        for button in (self.click_move, self.fit, self.inset, self.swap):
             row.addWidget(button)
 
     def show_camera(self, title: str) -> None:
@@ -147,6 +154,14 @@ class ImageBar(QWidget):
             self._exposures.setCurrentWidget(self._pages[title])
             several = len(self._pages) > 1
             self.camera.setText(f"{title} ▾" if several else title)
+
+    def show_move(self, problem: str, tool: str, *, on: bool = False) -> None:
+        """Offer that a click moves `tool`; a problem disables it and stands in its tooltip."""
+        self.click_move.setEnabled(not problem)
+        self.click_move.setChecked(on and not problem)
+        tip = f"Not now: {problem}" if problem else f"A click on the image moves the {tool} there"
+        if self.click_move.toolTip() != tip:
+            self.click_move.setToolTip(tip)
 
     # Showing
 
@@ -193,7 +208,7 @@ class ImageBar(QWidget):
         try:
             begin(lens)
         except CosmicError as exc:
-            self.told.emit(str(exc))
+            self.reported.emit(str(exc))
 
     def _focus_by(self, step: int) -> None:
         state = None if self._vico.lens is None else self._vico.lens.state(LensAxis.FOCUS)
@@ -201,7 +216,7 @@ class ImageBar(QWidget):
             return
         target = state.position_counts + step
         if not 0 <= target <= state.limit_counts:
-            self.told.emit(f"focus {target} lies outside 0 to {state.limit_counts} counts")
+            self.reported.emit(f"focus {target} lies outside 0 to {state.limit_counts} counts")
             return
         self._begin(lambda lens: lens.seek_focus(target))
 
@@ -214,7 +229,7 @@ class ImageBar(QWidget):
         try:
             self._vico.light.set_percent(float(percent))
         except CosmicError as exc:
-            self.told.emit(str(exc))
+            self.reported.emit(str(exc))
 
     @override
     def sizeHint(self) -> QSize:

@@ -10,7 +10,7 @@ from cosmic.daqco.gui.main_widget import UDaqMainWidget
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.vico.gui.vico_gui import VicoGui
 
-DAQCO: Final = "DAQCo"
+DAQCO: Final = "Force channels"
 LENS: Final = "Lens and light"
 NARROW_SCREEN_PX: Final = 1600
 LOW_SCREEN_PX: Final = 1000

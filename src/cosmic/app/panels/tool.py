@@ -1,5 +1,6 @@
 """The column TOOL: one tool is chosen, and moved by a pad, by targets, to poses, or back."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -26,7 +27,7 @@ from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
 from cosmic.frame.operation import Progress
 from cosmic.frame.overrides import override
 from cosmic.frame.units import DISPLAY, format_quantity
-from cosmic.frame.verdict import MoveVerdict
+from cosmic.frame.verdict import MoveVerdict, Reason
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.gui.detour_request import Goal
@@ -38,6 +39,8 @@ from cosmic.mico.hw.interface import PositionerKind
 
 USUAL_STEP_UM: Final = 10.0
 USUAL_STEP_DEG: Final = 1.0
+SAFE_SIDE: Final = 0.1
+"""How far before the place that a refusal names an axis is sent, in its unit."""
 _DIRECTIONS: Final = ("x", "y", "z")
 _PLACES: Final = {("x", -1): (1, 0), ("x", 1): (1, 2), ("y", 1): (0, 1), ("y", -1): (2, 1)}
 _Z_PLACES: Final = {1: (0, 3), -1: (2, 3)}
@@ -140,6 +143,8 @@ class ToolPanel(QWidget):
         self._rows: dict[str, _TargetRow] = {}
         self._steps: dict[str, float] = {}
         self._stopped = ""
+        self._verdict: MoveVerdict | None = None
+        self._last: tuple[str, Callable[[], None]] | None = None
         self._feed = StateFeed(self._mico, self)
         self._relay = Relay(self._on_progressed)
         self._make_widgets()
@@ -191,11 +196,24 @@ class ToolPanel(QWidget):
         self.go_pose.clicked.connect(self._on_go_pose)
         self.keep.clicked.connect(self._on_keep)
         self.pose_name.returnPressed.connect(self._on_pose_named)
+        self._make_ways_out()
         self.line = named(QLabel(), "toolLine")
         self.line.setWordWrap(True)
         self.line.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.line.setMinimumHeight(4 * STEP_PX)
         self.line.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+
+    def _make_ways_out(self) -> None:
+        """Make what a refusal leaves to be done, each by one button."""
+        self.nearest = named(push_button("", "Go as far as the gate allows"), "toolNearest")
+        self.detour = named(
+            push_button("Detour", "Plan a path around what is in between"), "detour"
+        )
+        for button in (self.nearest, self.detour):
+            styled(button, "narrow")
+            button.hide()
+        self.nearest.clicked.connect(self._on_nearest)
+        self.detour.clicked.connect(self._on_detour)
 
     def _arrange(self) -> None:
         choices = QGridLayout()
@@ -223,7 +241,10 @@ class ToolPanel(QWidget):
         self._column.setSpacing(STEP_PX // 2)
         self._column.addLayout(choices)
         self._column.addWidget(self._body)
-        for widget in (step, last, poses, self.pose_name, self.line):
+        ways, row = tight_row(STEP_PX // 2)
+        row.addWidget(self.nearest, 1)
+        row.addWidget(self.detour, 1)
+        for widget in (step, last, poses, self.pose_name, ways, self.line):
             self._column.addWidget(widget)
         self._column.addStretch(1)
 
@@ -300,7 +321,38 @@ class ToolPanel(QWidget):
             button.setAccessibleName(f"{axis.name} {text}")
             button.clicked.connect(lambda _=False, d=direction: self.move_once(axis.name, d))
             line.addWidget(button, 1)
+        width = QuantityField("um", low=0.0, name=f"Opening of {axis.name}; Enter goes there")
+        named(width, "gripperWidth").setMinimumWidth(8 * STEP_PX)
+        state = axis.details
+        if state.shown_position is not None:
+            width.set_value(round(state.shown_position))
+        width.entered.connect(lambda there: self.open_to(axis.name, there, width))
+        line.addWidget(width, 1)
         return row
+
+    def open_to(self, name: str, there_um: float, field: QuantityField) -> None:
+        """Open or close a gripper to a width, as far as its steps tell; uncertain as these are."""
+        card = self._gui.cards.get(name)
+        here_um = card.axis.details.shown_position if card is not None else None
+        if card is None or here_um is None:
+            field.refuse("the opening is unknown; initialise first")
+            return
+        size_um = card.settings.step_um or 1.0
+        count = round((there_um - here_um) / size_um)
+        if count == 0:
+            return
+        defaults = self._mico.settings.defaults
+        card.commands.issue(
+            "make steps",
+            lambda consent: card.axis.steps(
+                count,
+                amplitude_v=defaults.amplitude_v,
+                frequency_hz=defaults.frequency_hz,
+                wait=False,
+                consent=consent,
+            ),
+            field,
+        )
 
     # What is chosen
 
@@ -350,6 +402,7 @@ class ToolPanel(QWidget):
         if card is None or not self.step.commit():
             return
         self._say("")
+        self._last = (name, lambda: self.move_once(name, direction))
         axis, amount = card.axis, self.step.value()
         self._steps[self._unit] = amount
         defaults = self._mico.settings.defaults
@@ -391,6 +444,7 @@ class ToolPanel(QWidget):
         if card is None or not row.target.commit():
             return
         self._say("")
+        self._last = (name, lambda: self.move_to_target(name))
         there = row.target.value()
         card.commands.issue(
             "move to a position",
@@ -401,8 +455,8 @@ class ToolPanel(QWidget):
 
     def go_to_targets(self) -> None:
         """Move all axes whose target is elsewhere there, together."""
-        judged = [row.target.commit() for row in self._rows.values()]  # each shows its reason
-        if not all(judged):
+        checked = [row.target.commit() for row in self._rows.values()]  # each shows its reason
+        if not all(checked):
             return
         wanted = {
             name: row.target.value()
@@ -474,6 +528,8 @@ class ToolPanel(QWidget):
 
     def _say(self, text: str) -> None:
         shown = self._stopped or text
+        for button in (self.nearest, self.detour):
+            button.hide()
         self.line.setText(shown)
         self.line.setToolTip(shown)
 
@@ -482,8 +538,43 @@ class ToolPanel(QWidget):
         self._say(f"{look.glyph} {reason}")
 
     def _on_refused(self, verdict: MoveVerdict) -> None:
-        if not verdict.axis or verdict.axis in self.axes:
-            self._refuse(str(verdict))
+        if verdict.axis and verdict.axis not in self.axes:
+            return
+        self._refuse(str(verdict))
+        self._verdict = verdict
+        reachable = verdict.limit is not None and bool(verdict.axis)
+        if reachable and verdict.limit is not None:
+            self.nearest.setText(f"Go to {verdict.limit:.0f}")
+        self.nearest.setVisible(reachable)
+        again = self._last is not None and self._last[0] == verdict.axis
+        self.detour.setVisible(again and verdict.reason is Reason.COLLISION)
+
+    def _on_nearest(self) -> None:
+        """Move as far as the refusal says that the axis may go, a little less."""
+        verdict = self._verdict
+        if verdict is None or verdict.limit is None or verdict.axis not in self._gui.cards:
+            return
+        card = self._gui.cards[verdict.axis]
+        state = card.axis.details
+        here = state.position if state.position is not None else 0.0
+        back = math.copysign(min(SAFE_SIDE, abs(verdict.limit - here)), here - verdict.limit)
+        there = verdict.limit + back - state.zero
+        self._say("")
+        card.commands.issue(
+            "move to a position",
+            lambda consent: card.axis.move_to(there, wait=False, consent=consent),
+            goal=self._goal(state, there),
+        )
+
+    def _on_detour(self) -> None:
+        """Have a path planned to where the refused command led; it is shown before it is driven."""
+        if self._last is None or self._last[0] not in self._gui.cards:
+            return
+        name, again = self._last
+        commands = self._gui.cards[name].commands
+        before, commands.seeks_ways = commands.seeks_ways, True
+        again()
+        commands.seeks_ways = before
 
     def _on_said(self, text: str, state: object) -> None:
         glyph = state_look(state).glyph if isinstance(state, State) else ""

@@ -24,18 +24,19 @@ from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
 from cosmic.app.windows.stage import Stage, column_of
 from cosmic.frame.failure import Failure
+from cosmic.frame.gui.clearance_meter import closeness
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.gui.workspaces import Area, Place, Workspace
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.vico.gui.camera_view import CameraParts
 
-MICO: Final = "MiCo"
+MICO: Final = "Axes"
 TOOL: Final = "Tool"
 FORCE: Final = "Force"
 COACH: Final = "Next step"
 IMAGE: Final = "Image"
-CAMERA: Final = "Camera settings"
+CAMERA: Final = "Camera"
 RESULTS: Final = "Results"
 ALARMS: Final = "Alarms"
 HISTORY: Final = "History"
@@ -191,7 +192,7 @@ class TaskLayout(QObject):
     @staticmethod
     def _image_column(parts: CameraParts) -> QWidget:
         parts.gain.slider.hide()
-        parts.exposure.slider.hide()
+        parts.exposure.show_field_only()
         return column_of(parts.row, parts.gain, parts.status, parts.recorder)
 
     def add_coach(self, rules: tuple[Rule, ...]) -> Coach:
@@ -214,7 +215,9 @@ class TaskLayout(QObject):
         bar.swap_requested.connect(stage.swap)
         bar.fit_requested.connect(lambda: stage.camera.view.fit())
         bar.inset_toggled.connect(stage.set_inset_shown)
-        bar.told.connect(lambda text: stage.camera.say(text))
+        bar.move_toggled.connect(self._on_move_toggled)
+        self.tool.tool_chosen.connect(self._on_tool_chosen)
+        bar.reported.connect(lambda text: stage.camera.say(text))
         stage.changed.connect(self._on_large_changed)
         self.book.changed.connect(self._on_alarms_changed)
         window.top_bar.alarms_clicked.connect(lambda: window.raise_panel(ALARMS))
@@ -228,6 +231,30 @@ class TaskLayout(QObject):
         self._watch.start()
 
     # Reactions
+
+    def _on_move_toggled(self, on: bool) -> None:
+        """Have the next clicks on the image move the chosen tool, until that is put away."""
+        view = self.stage.camera
+        if on:
+            view.row.target_chosen.emit(self.tool.tool.name)
+        else:
+            view.tools.put_away()
+        self._show_move()
+
+    def _on_tool_chosen(self, name: str) -> None:
+        view = self.stage.camera
+        if view.tools.target and name in view.camera.targets:
+            view.row.target_chosen.emit(name)
+        elif view.tools.target:
+            view.tools.put_away()
+        self._show_move()
+
+    def _show_move(self) -> None:
+        view, name = self.stage.camera, self.tool.tool.name
+        problem = view.camera.calibration_problem
+        if not problem and name not in view.camera.targets:
+            problem = f"the {name} is no tool that the image knows"
+        self.bar.show_move(problem, name, on=bool(view.tools.target))
 
     def _on_large_changed(self, title: str) -> None:
         if title in self._columns:
@@ -244,10 +271,10 @@ class TaskLayout(QObject):
             self._window.drawer.line.set_text(f"written: {path}")
 
     def _folders(self) -> tuple[Path, ...]:
-        own = () if self._rig_elsewhere() else (self._rig.daqco.directory,)
+        own = () if self._force_remote() else (self._rig.daqco.directory,)
         return (self.folder.home, *own) if self.force is not None else (self.folder.home,)
 
-    def _rig_elsewhere(self) -> bool:
+    def _force_remote(self) -> bool:
         return self.force is None or bool(self._rig.daqco.remote)
 
     # Alarms
@@ -267,8 +294,19 @@ class TaskLayout(QObject):
         """Show everywhere that the stop is latched, and why; None: no longer."""
         self.tool.show_stopped(reason)
 
+    def _watch_clearance(self) -> None:
+        clearance = self._window.top_bar.clearance
+        if clearance is not None and closeness(clearance) == "margin":
+            one, other = clearance.bodies
+            cause = f"{one} and {other} are at their margin, {clearance.figures} µm apart"
+            self.book.raise_alarm("clearance", Level.WARNING, cause, "Move them apart")
+        else:
+            self.book.end("clearance")
+
     def watch(self) -> None:
         """Look at what raises alarms and is not told by itself."""
+        self._show_move()
+        self._watch_clearance()
         if self.force is None:
             return
         daqco, book = self._rig.daqco, self.book

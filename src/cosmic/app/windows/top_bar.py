@@ -7,7 +7,7 @@ from typing import Final
 from PySide6.QtCore import QObject, QSettings, Signal
 
 from cosmic.frame.gui.clearance_meter import Clearance
-from cosmic.frame.gui.top_bar import NO_COLLISION_MODEL, TopBar
+from cosmic.frame.gui.top_bar import MODE_WORDS, NO_COLLISION_MODEL, TopBar
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.gui.mico_widget import MicoWidget
 
@@ -70,7 +70,7 @@ SCM: Final = "SCM"
 ECM: Final = "ECM"
 ACM: Final = "ACM"
 NO_MICO: Final = "this window has no axes"
-NO_ACM: Final = "procedures need MiCo, DAQCo and ViCo, with the cameras in this program"
+NO_ACM: Final = "procedures need axes, force and cameras, all in this program"
 NO_ECM: Final = f"{NO_COLLISION_MODEL}; name a scene in the platform file"
 _KEY: Final = "window/mode"
 
@@ -139,7 +139,7 @@ class ControlMode(QObject):
         """Put `mode` in force, if it can be chosen."""
         if mode not in self._available or mode == self._mode:
             return
-        logger.info("control mode %s (was %s)", mode, self._mode)
+        logger.info("control mode %s (was %s)", MODE_WORDS[mode], MODE_WORDS[self._mode])
         self._mode = mode
         self._settings.setValue(_KEY, mode)
         self._bar.set_mode(mode)

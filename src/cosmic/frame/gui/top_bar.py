@@ -41,6 +41,15 @@ MODES: Final = {
 }
 
 
+MODE_WORDS: Final = {"MCM": "Manual", "SCM": "Replay", "ECM": "Guided", "ACM": "Automatic"}
+"""How the modes of the thesis are called in the window."""
+
+
+def mode_tip(name: str) -> str:
+    """Return what a mode is, with its name in the thesis."""
+    return f"{MODES[name]} ({name})"
+
+
 class ModeSelector(QWidget):
     """Shows the mode in force; a click only asks for another one."""
 
@@ -55,7 +64,8 @@ class ModeSelector(QWidget):
         row.setSpacing(0)
         for name in MODES:
             button = named(QToolButton(), "modeButton")
-            button.setText(name)
+            button.setText(MODE_WORDS[name])
+            button.setProperty("mode", name)
             button.setCheckable(True)
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             button.clicked.connect(self._on_clicked)
@@ -101,13 +111,13 @@ class ModeSelector(QWidget):
         for each, button in self._buttons.items():
             button.setChecked(each == name)
         self._list.setText(f"{self._buttons[name].text()} ▾")
-        self._list.setToolTip(MODES[name])
+        self._list.setToolTip(f"Control mode. {mode_tip(name)}")
 
     def set_available(self, name: str, why_not: str = "") -> None:
         """Let `name` be chosen, or say in its tooltip why it cannot be."""
         button = self._buttons[name]
         button.setEnabled(not why_not)
-        tip = f"{MODES[name]}\nNot available: {why_not}" if why_not else MODES[name]
+        tip = f"{mode_tip(name)}\nNot available: {why_not}" if why_not else mode_tip(name)
         button.setToolTip(tip)
 
     def _on_clicked(self) -> None:
@@ -194,6 +204,7 @@ class TopBar(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # a click on it ends typing in a field
         self._latched = False
         self._workspaces: WorkspaceButtons | None = None
+        self._nearest: Clearance | None = None
         self._theme_then = current_palette().name
         self._make_widgets(title, stop_key)
         self._arrange()
@@ -376,10 +387,16 @@ class TopBar(QWidget):
 
     def set_clearance(self, reading: Clearance | None, why_not: str = "") -> None:
         """Show how near the nearest two bodies are; None: it is not known, and why."""
+        self._nearest = reading
         if reading is None:
             self._clearance.show_unknown(why_not)
         else:
             self._clearance.show_clearance(reading)
+
+    @property
+    def clearance(self) -> Clearance | None:
+        """The nearest pair; None while it is not known."""
+        return self._nearest
 
     def set_unwatched(self, axes: Collection[str]) -> None:
         """Say loudly which axes are taken out of collision detection."""

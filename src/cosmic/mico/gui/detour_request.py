@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import MoveVerdict
 
-HINT = "In mode ECM a detour can be planned."
-"""Said with a refusal where mode ECM would do something about it."""
+HINT = "In mode Guided a detour can be planned."
+"""Said with a refusal where mode Guided would do something about it."""
 
 
 @dataclass(frozen=True, slots=True)

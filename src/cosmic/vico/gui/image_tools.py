@@ -54,6 +54,11 @@ class ImageTools(QObject):
         image = self._view.image
         return None if image is None else image.circumstances.scale_um_px
 
+    @property
+    def target(self) -> str:
+        """What a click moves; empty where it moves nothing."""
+        return self._target
+
     def refresh(self) -> None:
         """Put the tool away that can no longer be used."""
         if self._target and self._camera.calibration_problem:

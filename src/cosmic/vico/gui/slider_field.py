@@ -39,16 +39,21 @@ class SliderField(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(STEP_PX // 2)
-        if caption:
-            label = QLabel(caption)
-            label.setProperty("role", "dim")
-            row.addWidget(label)
+        self._caption = QLabel(caption)
+        self._caption.setProperty("role", "dim")
+        self._caption.setVisible(bool(caption))
+        row.addWidget(self._caption)
         row.addWidget(self.field)
         row.addWidget(self.slider, 1)
         self._settle = QTimer(self, interval=SETTLE_MS, singleShot=True)
         self._settle.timeout.connect(self._on_settled)
         self.field.committed.connect(self._on_field)
         self.slider.valueChanged.connect(self._on_slider)
+
+    def show_field_only(self) -> None:
+        """Leave caption and slider away, where there is room for the field alone."""
+        self._caption.hide()
+        self.slider.hide()
 
     def set_range(self, low: float, high: float, step: float = 0.0) -> None:
         """Let both go from `low` to `high`."""

@@ -28,6 +28,7 @@ from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.relay import Relay
+from cosmic.frame.gui.screen_fit import FittedPanel
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.operation import Operation
@@ -191,8 +192,8 @@ class CampaignPanel(QWidget):
             flow.addWidget(widget)
         self.tabs = QTabWidget()
         self.tabs.addTab(self.procedure, "Procedure")
-        self.tabs.addTab(self.board, "Fibres")
-        self.tabs.addTab(self.card, "Fibre")
+        self.tabs.addTab(FittedPanel(self.board), "Fibres")
+        self.tabs.addTab(FittedPanel(self.card), "Fibre")
         whole = QVBoxLayout(self)
         whole.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, 0)
         whole.setSpacing(STEP_PX)
