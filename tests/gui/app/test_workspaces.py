@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import combinations
+from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QPoint, QRect, QSettings, Qt
@@ -10,6 +11,7 @@ from PySide6.QtWidgets import (
     QAbstractScrollArea,
     QApplication,
     QComboBox,
+    QDialogButtonBox,
     QLabel,
     QLineEdit,
     QPushButton,
@@ -21,6 +23,8 @@ from pytestqt.qtbot import QtBot
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.app.windows.stage import Stage
 from cosmic.app.windows.tasks import HANDLE, LOOK, MEASURE, SET_UP, TaskLayout
+from cosmic.daqco.gui.limit_dialog import LimitDialog
+from cosmic.daqco.gui.limit_indicator import LimitIndicator
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.stop_button import StopButton
 from gui.app.windows import Make, mico
@@ -262,3 +266,88 @@ def test_a_layout_is_kept_by_name_and_reset(make: Make, qtbot: QtBot, stored: QS
     assert again.workspaces.layout_name == "mine"
     assert again.workspaces.current == HANDLE
     assert not again.dock("Next step").isVisible()
+
+
+class Actions:
+    """Counts what a hand does."""
+
+    def __init__(self, qtbot: QtBot) -> None:
+        self.count = 0
+        self._qtbot = qtbot
+
+    def click(self, widget: QWidget) -> None:
+        self.count += 1
+        assert widget.isVisible()
+        assert widget.isEnabled()
+        self._qtbot.mouseClick(widget, LEFT)
+
+    def enter(self, field: QLineEdit, text: str) -> None:
+        self.count += 1
+        assert field.isVisible()
+        field.setFocus()  # else the letters are keys that jog
+        field.selectAll()
+        self._qtbot.keyClicks(field, text)
+
+
+def test_a_named_recording_takes_three_actions_and_its_slope_is_read_with_two_more(
+    whole: OperatorWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tasks(whole).folder, "_folder", tmp_path)
+    monkeypatch.setattr(tasks(whole).folder, "home", tmp_path)
+    buttons = whole.top_bar.workspaces
+    force = tasks(whole).force
+    assert buttons is not None
+    assert force is not None
+    hand = Actions(qtbot)
+    hand.click(buttons.buttons[MEASURE])
+    qtbot.waitUntil(force.record.isEnabled)
+    hand.enter(force.name, "soft pulp")
+    hand.click(force.record)
+    assert hand.count <= 3
+    daqco = whole.platform.daqco
+    assert daqco is not None
+    qtbot.waitUntil(lambda: daqco.recorder.state.active and daqco.recorder.state.duration_s > 0.5)
+    qtbot.mouseClick(force.record, LEFT)
+    qtbot.waitUntil(lambda: not daqco.recorder.state.active)
+    qtbot.waitUntil(lambda: "written" in force.message.text())
+
+    hand = Actions(qtbot)
+    hand.click(buttons.buttons["Results"])
+    found = tasks(whole).results.list
+    item = found.topLevelItem(0)
+    assert item is not None
+    assert item.text(0).startswith("soft pulp")
+    hand.count += 1
+    place = found.visualItemRect(item).center()
+    qtbot.mouseClick(found.viewport(), LEFT, pos=place)
+    assert hand.count <= 6
+    assert "slope" in tasks(whole).results.slope.text()
+
+
+def test_a_force_limit_is_set_by_three_actions(whole: OperatorWindow, qtbot: QtBot) -> None:
+    choose(whole, qtbot, MEASURE)
+    force = tasks(whole).force
+    assert force is not None
+    hand = Actions(qtbot)
+    hand.click(force.arm)
+    dialog = force.findChild(LimitDialog)
+    assert dialog is not None
+    hand.enter(dialog.high, "90")
+    hand.click(dialog.buttons.button(QDialogButtonBox.StandardButton.Ok))
+    assert hand.count <= 3
+    qtbot.waitUntil(lambda: "-150 to 90" in force.limit.text())
+    qtbot.waitUntil(lambda: "/90 ARMED" in whole.top_bar.findChild(LimitIndicator).text())
+
+
+def test_a_refused_move_offers_how_far_it_may_go(whole: OperatorWindow, qtbot: QtBot) -> None:
+    choose(whole, qtbot, HANDLE)
+    tool = tasks(whole).tool
+    card = mico(whole).cards["left.z"]
+    qtbot.waitUntil(lambda: card.axis.details.present)
+    tool.step.setText("4000")
+    qtbot.mouseClick(tool.pad["z", -1], LEFT)
+    qtbot.waitUntil(tool.nearest.isVisible)
+    assert "plate" in tool.line.text()
+    wanted = float(tool.nearest.text().removeprefix("Go to "))
+    qtbot.mouseClick(tool.nearest, LEFT)
+    qtbot.waitUntil(lambda: abs(position(card) - wanted) < 2.0)

@@ -115,7 +115,7 @@ class ImageBar(QWidget):
         self.light.valueChanged.connect(self._on_light)
 
     def _make_view_buttons(self) -> None:
-        self.click_move = named(_button("⌖ Move", ""), "barMove")
+        self.click_move = named(_button("Move", ""), "barMove")
         self.click_move.setCheckable(True)
         self.click_move.clicked.connect(self.move_toggled)
         self.show_move("nothing is calibrated yet", "")

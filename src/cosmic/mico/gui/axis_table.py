@@ -30,7 +30,7 @@ from cosmic.mico.hw.interface import PositionerKind
 
 _HEADS: Final = ("Axis", "State", "Position", "", "", "Step", "", "Target", "", "", "")
 _FIELD_PX: Final = 10 * STEP_PX
-_SIDE_PX: Final = 8 * STEP_PX
+_SIDE_PX: Final = 9 * STEP_PX
 
 
 class AxisRow(QObject):
