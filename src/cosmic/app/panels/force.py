@@ -27,7 +27,6 @@ from cosmic.app.panels.curve_frame import CurveFrame
 from cosmic.daqco.api.daqco import Daqco, DaqLimit
 from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.core.chunk import DataChunk
-from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.gui.asking import Asking
 from cosmic.daqco.gui.colours import readable
 from cosmic.daqco.gui.limit_dialog import LimitDialog
@@ -431,8 +430,7 @@ class ForcePanel(QWidget):
     def take_zero(self) -> None:
         """Call the present force zero, by another scale; refused while the sensor is loaded."""
         value = self._mean()
-        scale = self._daqco.scales.get(self._channel)
-        if value is None or self._age_s() or scale is None:
+        if value is None or self._age_s():
             self._say("Tare needs a force that is measured now", refused=True)
             return
         limit = self._limit_in_force()
@@ -442,11 +440,8 @@ class ForcePanel(QWidget):
             text = f"{value:.0f} is a load, no zero: take the tool off the fibre first"
             self._say(text, refused=True)
             return
-        first, *rest = scale.coefficients
-        zeroed = Scale(scale.name, scale.unit, (first - value, *rest))
-        self._ask(
-            lambda: self._daqco.set_scale(self._channel, zeroed), f"zero moved by {value:.1f}"
-        )
+        channel = self._channel
+        self._ask(lambda: self._daqco.tare(channel), f"zero moved by {value:.1f}")
 
     def _ask(self, action: Callable[[], T], said: str, *, slow: bool = False) -> None:
         def done(_result: T | None, error: CosmicError | None) -> None:
