@@ -52,6 +52,51 @@ def start_two(controller: Controller, way_um: float) -> None:
         controller.move_to(at, way_um, "um", hold_s=math.inf)
 
 
+def start_all(controller: Controller, channels: int, way_um: float) -> None:
+    """Send all axes of a device off: as one command group where there is one."""
+    if controller.capabilities.group_start:
+        moves = [
+            MatchedMove(Channel(0, number), way_um, "um", math.inf, 1000.0, 50_000.0, 100.0)
+            for number in range(channels)
+        ]
+        controller.move_together(moves)
+        return
+    for number in range(channels):
+        controller.move_to(Channel(0, number), way_um, "um", hold_s=math.inf)
+
+
+def stop_all(controller: Controller, channels: int) -> None:
+    """Stop all axes of a device."""
+    for number in range(channels):
+        controller.stop(Channel(0, number))
+
+
+def figures_of_full(make: str, channels: int, count: int) -> list[Figure]:
+    """Return the figures of one device with all its channels."""
+    clock = RatedClock(1.0)
+    load = load_scu3d if make == "SCU" else load_smaractctl
+    kind = Scu3dController if make == "SCU" else SmaractCtlController
+    controller: Controller = kind(load("L" * channels, clock=clock), simulated=True)
+    controller.open()
+
+    def start(number: int) -> float:
+        spent = spent_s(lambda: start_all(controller, channels, 200.0 * (number % 2)))
+        stop_all(controller, channels)
+        return spent
+
+    def stop(number: int) -> float:
+        start_all(controller, channels, 500.0 * (number % 2))
+        return spent_s(lambda: stop_all(controller, channels))
+
+    measured = {f"start of all {channels} axes": start, f"stop of all {channels} axes": stop}
+    figures = [
+        Figure(NAME, f"{make}: {name}", median_ms(count, call), "ms")
+        for name, call in measured.items()
+    ]
+    controller.close()
+    return figures
+
+
 def figures_of(make: str, count: int) -> list[Figure]:
     """Return the figures of one make."""
     clock = RatedClock(1.0)
@@ -88,7 +133,10 @@ def figures_of(make: str, count: int) -> list[Figure]:
 def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of one run."""
     count = 3 if quick else 200
-    return [figure for make in ("SCU", "MCS2") for figure in figures_of(make, count)]
+    two = [figure for make in ("SCU", "MCS2") for figure in figures_of(make, count)]
+    full = [("SCU", 3), ("MCS2", 3), ("MCS2", 18)]
+    few = max(3, count // 4)
+    return two + [each for make, most in full for each in figures_of_full(make, most, few)]
 
 
 if __name__ == "__main__":
