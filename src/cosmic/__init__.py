@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from cosmic.mico.api.jogging import Jogging
     from cosmic.mico.api.mico import Mico
     from cosmic.mico.core.motion.movement import Movement
+    from cosmic.vico.api.measure import Measurement, measure
 
 
 # A script decides itself whether it wants to see the log.
@@ -67,6 +68,7 @@ _HOMES = {
     "cosmic.mico.api.group": ("GroupMovement",),
     "cosmic.mico.api.mico": ("Mico",),
     "cosmic.mico.core.motion.movement": ("Movement",),
+    "cosmic.vico.api.measure": ("Measurement", "measure"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -80,6 +82,7 @@ __all__ = [
     "GroupMovement",
     "Jogging",
     "LimitError",
+    "Measurement",
     "Mico",
     "MoveCancelled",
     "MoveRefused",
@@ -96,6 +99,7 @@ __all__ = [
     "Task",
     "UnknownAxisError",
     "connect",
+    "measure",
     "open_recording",
 ]
 

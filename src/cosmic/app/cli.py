@@ -125,6 +125,15 @@ def _add_file_commands(
     setup.add_argument("--config", type=Path, default=None, metavar="PATH", help=_CONFIG)
     setup.add_argument("--move", action="store_true", help="offer to move each a little")
     setup.add_argument("--write", action="store_true", help="add the entries; comments are kept")
+    measure = commands.add_parser("measure", help="measure the fibres on images of any origin")
+    measure.add_argument("images", type=Path, nargs="+", metavar="IMAGE", help="files or folders")
+    measure.add_argument(
+        "--pixel-size-um", type=float, metavar="UM", help="instead of what the files say"
+    )
+    measure.add_argument(
+        "--output", type=Path, metavar="FOLDER", help="results (default: ./measured)"
+    )
+    measure.add_argument("--overwrite", action="store_true", help="replace results that exist")
     device = commands.add_parser(
         "new-device", help="write a package that brings a device or a method, to change it"
     )

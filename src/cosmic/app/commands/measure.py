@@ -1,0 +1,100 @@
+"""``cosmic measure``: the fibres on images from anywhere, without a platform."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from cosmic.frame.errors import CosmicError, RecordingError
+from cosmic.vico.api.measure import (
+    SUFFIXES,
+    Measurement,
+    measure_page,
+    read_images,
+    write_csv,
+    write_json,
+    write_overlay,
+    write_rois,
+)
+
+TABLE, WHOLE = "fibres.csv", "fibres.json"
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Measure files one after another; one that is refused does not keep the rest from it."""
+    files = found_files(chosen.images)
+    folder: Path = chosen.output or Path("measured")
+    _prepare(folder, overwrite=chosen.overwrite)
+    measured: list[Measurement] = []
+    refused = 0
+    for number, file in enumerate(files, start=1):
+        if sys.stderr.isatty():
+            sys.stderr.write(f"\r{number} of {len(files)}: {file.name}\033[K")
+        try:
+            measured += _measured(file, folder, f"{number:04d}-{file.stem}", chosen.pixel_size_um)
+        except CosmicError as exc:
+            refused += 1
+            sys.stderr.write(f"\ncosmic: {file}: {exc}\n")
+    if sys.stderr.isatty():
+        sys.stderr.write("\n")
+    write_csv(folder / TABLE, measured)
+    write_json(folder / WHOLE, measured)
+    sys.stdout.write(summary(measured, refused) + f"{folder}\n")
+    return 1 if refused else 0
+
+
+def found_files(chosen: Sequence[Path]) -> list[Path]:
+    """Return the files, those of folders by name; raises `RecordingError` where there is none."""
+    files: list[Path] = []
+    for each in chosen:
+        if each.is_dir():
+            files += sorted(one for one in each.iterdir() if one.suffix.lower() in SUFFIXES)
+        else:
+            files.append(each)
+    if not files:
+        raise RecordingError(f"no image ({', '.join(SUFFIXES)}) in the folder; name another")
+    return files
+
+
+def summary(measured: Sequence[Measurement], refused: int) -> str:
+    """Return what was found, in lines."""
+    fibres = [fibre for each in measured for fibre in each.fibres]
+    certain = sum(fibre.certain for fibre in fibres)
+    lines = [
+        f"images measured: {len(measured)}, files refused: {refused}",
+        f"fibres: {len(fibres)}, certain: {certain}",
+    ]
+    lengths = [length for each in measured for length in each.lengths_um]
+    if lengths:
+        mean = sum(lengths) / len(lengths)
+        weighted = sum(length**2 for length in lengths) / sum(lengths)
+        lines.append(f"length of certain fibres: mean {mean:.1f} µm, weighted {weighted:.1f} µm")
+    without = sum(each.pixel_size_um is None for each in measured)
+    if without:
+        lines.append(f"images without a pixel size: {without}; give one with --pixel-size-um")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _measured(
+    file: Path, folder: Path, stem: str, pixel_size_um: float | None
+) -> list[Measurement]:
+    found = []
+    for number, page in enumerate(read_images(file), start=1):
+        one = measure_page(page, pixel_size_um)
+        name = stem if number == 1 else f"{stem}-page-{number}"
+        write_overlay(folder / f"{name}-overlay.png", page.pixels, one)
+        write_rois(folder / f"{name}-rois.zip", one)
+        found.append(one)
+    return found
+
+
+def _prepare(folder: Path, *, overwrite: bool) -> None:
+    there = [each for each in (folder / TABLE, folder / WHOLE) if each.exists()]
+    if there and not overwrite:
+        raise RecordingError(
+            f"{there[0]}: exists; choose another folder with --output, or say --overwrite"
+        )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as exc:
+        raise RecordingError(f"{folder}: cannot be created ({exc.strerror or exc})") from exc

@@ -1,0 +1,1 @@
+"""Fibres measured on images from anywhere, without a platform."""

@@ -1,0 +1,130 @@
+"""Images of other programs, with the pixel size that their metadata tell."""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.frame.errors import RecordingError
+
+if TYPE_CHECKING:
+    import tifffile
+
+TIFF = (".tif", ".tiff")
+SUFFIXES = (*TIFF, ".png", ".jpg", ".jpeg")
+# What a resolution says above is how large a picture is printed (300 dpi are 85 µm).
+PRINTED_UM = 25.0
+UM_IN = {"m": 1e6, "cm": 1e4, "mm": 1e3, "µm": 1.0, "μm": 1.0, "um": 1.0, "nm": 1e-3}
+WORDS = {"micron": 1.0, "microns": 1.0, "\\u00B5m": 1.0, "inch": 25_400.0}
+TAG_UM = {2: 25_400.0, 3: 1e4}
+NOT_KNOWN = "not known"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FileImage:
+    """One page of a file.
+
+    Attributes
+    ----------
+    pixels : ndarray, shape (height, width) or (height, width, layers)
+        Colours in the order blue, green, red.
+    """
+
+    name: str
+    pixels: npt.NDArray[np.generic]
+    pixel_size_um: float | None
+    pixel_size_from: str
+
+
+def read_images(path: Path) -> Iterator[FileImage]:
+    """Yield the pages of a TIFF, PNG or JPEG.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read, or is of another kind.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise RecordingError(f"{path}: is not one of {', '.join(SUFFIXES)}")
+    if path.suffix.lower() in TIFF:
+        yield from _tiff_pages(path)
+        return
+    try:
+        coded = path.read_bytes()
+        pixels = cv2.imdecode(np.frombuffer(coded, np.uint8), cv2.IMREAD_UNCHANGED)
+    except (OSError, cv2.error) as exc:
+        raise RecordingError(f"{path}: cannot be read ({exc})") from exc
+    if pixels is None:
+        raise RecordingError(f"{path}: is no image, or damaged")
+    size = _png_size_um(coded)
+    yield FileImage(path.name, pixels, size, "PNG resolution" if size else NOT_KNOWN)
+
+
+def _tiff_pages(path: Path) -> Iterator[FileImage]:
+    import tifffile
+
+    try:
+        with tifffile.TiffFile(path) as file:
+            size, source = _tiff_size_um(file)
+            count = len(file.pages)
+            for number in range(count):
+                pixels = file.pages[number].asarray()
+                if pixels.ndim == 3 and pixels.shape[0] in (3, 4) and pixels.shape[2] > 4:
+                    pixels = np.moveaxis(pixels, 0, 2)
+                if pixels.ndim == 3 and pixels.shape[2] in (3, 4):
+                    pixels = pixels[:, :, [2, 1, 0]]
+                name = path.name if count == 1 else f"{path.name} page {number + 1}"
+                yield FileImage(name, pixels, size, source)
+    except (OSError, ValueError, LookupError, struct.error, tifffile.TiffFileError) as exc:
+        raise RecordingError(f"{path}: cannot be read ({exc})") from exc
+
+
+def _tiff_size_um(file: "tifffile.TiffFile") -> tuple[float | None, str]:
+    """Return the pixel size of OME, else of ImageJ, else of the resolution."""
+    ome = _ome_size_um(file.ome_metadata)
+    if ome:
+        return ome, "OME"
+    first: Any = file.pages[0]  # by type a frame as well, which the first one never is
+    tags = first.tags
+    per_unit = tags["XResolution"].value if "XResolution" in tags else (0, 1)
+    pixels_each = per_unit[0] / per_unit[1] if per_unit[1] else 0.0
+    if not pixels_each > 0:
+        return None, NOT_KNOWN
+    unit = str((file.imagej_metadata or {}).get("unit", ""))
+    known = (UM_IN | WORDS).get(unit)
+    if known:
+        return known / pixels_each, "ImageJ"
+    tag = tags["ResolutionUnit"].value if "ResolutionUnit" in tags else 0
+    size = TAG_UM.get(int(tag), 0.0) / pixels_each
+    return (size, "TIFF resolution") if 0 < size < PRINTED_UM else (None, NOT_KNOWN)
+
+
+def _ome_size_um(text: str | None) -> float | None:
+    if not text:
+        return None
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError:
+        return None
+    for each in root.iter():
+        if each.tag.endswith("}Pixels") and "PhysicalSizeX" in each.attrib:
+            unit = UM_IN.get(each.attrib.get("PhysicalSizeXUnit", "µm"), 0.0)
+            size = float(each.attrib["PhysicalSizeX"]) * unit
+            return size if 0 < size < float("inf") else None
+    return None
+
+
+def _png_size_um(coded: bytes) -> float | None:
+    """Return the pixel size in the chunk pHYs of a PNG."""
+    at = coded[:4096].find(b"pHYs")
+    if not coded.startswith(b"\x89PNG") or at < 0 or len(coded) < at + 13:
+        return None
+    per_m, _, unit = struct.unpack(">IIB", coded[at + 4 : at + 13])
+    size = 1e6 / per_m if unit == 1 and per_m else 0.0
+    return size if 0 < size < PRINTED_UM else None

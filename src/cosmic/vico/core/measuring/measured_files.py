@@ -1,0 +1,105 @@
+"""What was measured, written for spreadsheets, programs, people and ImageJ."""
+
+import csv
+import io
+import json
+import struct
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.frame.errors import RecordingError
+from cosmic.vico.core.measuring.measurement import Measurement
+from cosmic.vico.core.vision.fibre import Fibre
+from cosmic.vico.core.vision.grey import grey_image
+
+CERTAIN_BGR, DOUBTFUL_BGR = (80, 200, 60), (40, 140, 255)
+ROI_VERSION, POLYLINE, SUB_PIXEL = 228, 5, 128
+
+
+def write_csv(path: Path, measured: Sequence[Measurement]) -> None:
+    """Write a row for each fibre; raises `RecordingError`."""
+    rows = [row for each in measured for row in each.rows()]
+    text = io.StringIO(newline="")
+    if rows:
+        writer = csv.DictWriter(text, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    _write(path, text.getvalue().encode())
+
+
+def write_json(path: Path, measured: Sequence[Measurement]) -> None:
+    """Write everything, centre lines too; raises `RecordingError`."""
+    images = [
+        {
+            "image": each.name,
+            "rows": each.shape[0],
+            "columns": each.shape[1],
+            "pixel_size_um": each.pixel_size_um,
+            "pixel_size_from": each.pixel_size_from,
+            "fibres": [
+                row | {"centre_line_px": np.round(fibre.centre_line_px, 3).tolist()}
+                for row, fibre in zip(each.rows(), each.fibres, strict=True)
+            ],
+        }
+        for each in measured
+    ]
+    _write(path, json.dumps({"images": images}, indent=1, ensure_ascii=False).encode())
+
+
+def write_overlay(path: Path, image: npt.NDArray[np.generic], measured: Measurement) -> None:
+    """Write the image with its fibres as PNG: certain ones green, others orange."""
+    grey = grey_image(image).astype(np.float32)
+    low, high = (float(value) for value in np.percentile(grey, (0.1, 99.9)))
+    even = np.clip((grey - low) / max(high - low, 1.0) * 255.0, 0, 255).astype(np.uint8)
+    drawn = cv2.cvtColor(even, cv2.COLOR_GRAY2BGR)
+    for number, fibre in enumerate(measured.fibres, start=1):
+        colour = CERTAIN_BGR if fibre.certain else DOUBTFUL_BGR
+        line = np.round(fibre.centre_line_px * 16).astype(np.int32).reshape(-1, 1, 2)
+        cv2.polylines(drawn, [line], False, colour, 2, cv2.LINE_AA, shift=4)
+        x, y = (int(value) for value in fibre.centre_line_px[0])
+        cv2.putText(drawn, str(number), (x + 6, y - 6), cv2.FONT_HERSHEY_SIMPLEX, 0.6, colour, 2)
+    done, coded = cv2.imencode(".png", drawn)
+    if not done:
+        raise RecordingError(f"{path}: the overlay cannot be written as PNG")
+    _write(path, coded.tobytes())
+
+
+def write_rois(path: Path, measured: Measurement) -> None:
+    """Write the centre lines as ROIs that ImageJ and Fiji open; raises `RecordingError`."""
+    whole = io.BytesIO()
+    with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED) as archive:
+        for number, fibre in enumerate(measured.fibres, start=1):
+            said = "certain" if fibre.certain else "doubtful"
+            archive.writestr(f"fibre-{number:03d}-{said}.roi", roi(fibre))
+    _write(path, whole.getvalue())
+
+
+def roi(fibre: Fibre) -> bytes:
+    """Return a polyline as ImageJ's RoiDecoder reads it: big-endian, with sub-pixel points.
+
+    ImageJ counts from the corner of a pixel, this program from its centre.
+    """
+    points = fibre.centre_line_px + 0.5
+    low = np.floor(points.min(axis=0)).astype(int)
+    high = np.ceil(points.max(axis=0)).astype(int)
+    width = int(np.clip(round(fibre.width_px), 1, 32_767))
+    head = struct.pack(
+        ">4shBBhhhhH16shiiihhBBhii",
+        b"Iout", ROI_VERSION, POLYLINE, 0, low[1], low[0], high[1], high[0], len(points), bytes(16),
+        width, 0, 0, 0, 0, SUB_PIXEL, 0, 0, 0, 0, 0,
+    )  # fmt: skip
+    whole = np.round(points - low).astype(">i2").T.tobytes()
+    data: bytes = head + whole + points.astype(">f4").T.tobytes()
+    return data
+
+
+def _write(path: Path, data: bytes) -> None:
+    try:
+        path.write_bytes(data)
+    except OSError as exc:
+        raise RecordingError(f"{path}: cannot be written ({exc.strerror or exc})") from exc
