@@ -181,7 +181,7 @@ def test_a_card_shows_image_curves_and_numbers(card: FibreCard, qtbot: QtBot) ->
     texts = _texts(card)
     assert any(" to " in text and "N m²" in text for text in texts)
     assert sum("±" in text for text in texts) == 2 + len(record.spans), "length, clamp, spans"
-    assert any("Force scale not verified." in text for text in texts)
+    assert "Force scale not verified." in card.doubts.toolTip() + card.doubts.text()
     replayed: list[int] = []
     card.replay_requested.connect(replayed.append)
     qtbot.mouseClick(card.replay, LEFT)
