@@ -37,7 +37,7 @@ def test_a_gap_between_two_fibres_is_never_one_certain_fibre(gap_px: float, widt
     assert not certain(seen(dark, seed=int(gap_px)))
 
 
-@pytest.mark.parametrize("width", [6.0, 12.0, 24.0])
+@pytest.mark.parametrize("width", [8.0, 12.0, 24.0])
 def test_two_fibres_that_overlap_and_let_light_through_are_doubted(width: float) -> None:
     dark = stretch(-260, width / 2, width) + stretch(-width / 2, 220, width)
     assert not certain(seen(dark, seed=1))

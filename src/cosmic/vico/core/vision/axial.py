@@ -25,6 +25,8 @@ TIMES = 6.5
 DIP, BUMP = 0.1, 0.3
 CONTRAST_STEP, WIDTH_STEP = 0.12, 0.1
 SIDE_STEP, SIDE_STEP_PX = 0.04, 0.4
+# Narrower, a lumen, a speck on it and an overlap look alike: a gap alone is a sign then.
+LEAST_WIDTH_PX = 7.5
 
 
 def joints(scene: Scene, course: Course) -> list[str]:
@@ -49,6 +51,8 @@ def joints(scene: Scene, course: Course) -> list[str]:
     fine = [_uneven(values, blur, window) for values in (inner, mass)]
     if any(_beyond(-values, seen, DIP) for values in fine):
         found.append(GAP)
+    if course.width < LEAST_WIDTH_PX:
+        return found
     if _beyond(fine[0], seen, BUMP):
         found.append(DOUBLED)
     steps = (
