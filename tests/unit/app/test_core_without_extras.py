@@ -45,6 +45,7 @@ for module in pkgutil.walk_packages(cosmic.__path__, "cosmic."):
             print(module.name, exc.name)
 """
 NEEDS_NET = ("cosmic.frame.network.",)
+NEEDS_PYTEST = ("cosmic.testing.",)
 
 
 def test_only_the_network_needs_an_extra() -> None:
@@ -57,6 +58,8 @@ def test_only_the_network_needs_an_extra() -> None:
         timeout=115,
     )
     missed = dict(line.split() for line in ended.stdout.splitlines())
+    suites = {name for name in missed if name.startswith(NEEDS_PYTEST)}
+    assert {missed.pop(name) for name in suites} == {"pytest"}, "suites need pytest, nothing else"
     assert not {name: lacking for name, lacking in missed.items() if not name.startswith(NEEDS_NET)}
     lacking = set(missed.values())
     assert lacking <= {"msgpack", "zenoh", "cryptography"}
