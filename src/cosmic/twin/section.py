@@ -98,7 +98,7 @@ class Section:
 
 
 def _places(settings: FibreSettings, key: str) -> Floats:
-    """Return where its weak places are: as often as told, at random."""
+    """Return where its weak places are: as often as the settings say, at random."""
     chance = random.Random(f"hinges {key}")
     places: list[float] = []
     at = 0.0

@@ -111,7 +111,7 @@ class Timeline:
         self._workspace = workspace
         self._guideways = guideways
         self._sense = sense
-        self._told: dict[str, float] = {}
+        self._encoders: dict[str, float] = {}
         self._signals_un: deque[float] = deque(maxlen=KEPT)
         self._tracks = tuple(Track(stages[name]) for name in sorted(workspace.stages))
         self._step_s = step_s
@@ -222,12 +222,12 @@ class Timeline:
         for track in self._tracks:
             path, name = track.path(time_s), track.stage.name
             if self._resting.get(name) is not path:
-                self._told[name] = track.position(time_s)
+                self._encoders[name] = track.position(time_s)
                 if path.end_s <= time_s:
                     self._resting[name] = path
-        self._values = self._told
+        self._values = self._encoders
         if not self._guideways.true:
-            self._values = self._guideways.follow(self._told, time_s)
+            self._values = self._guideways.follow(self._encoders, time_s)
         self._felt = self._workspace.look(self._values, time_s)
         self._times_s.append(time_s)
         total = self._felt.total_un

@@ -29,7 +29,7 @@ CURL_INDEX: Final = "curl_index"
 """A key of a fibre that stands for `curl_deg`: length over the distance of the ends, less one."""
 
 WHOLE_FIBRE_UM: Final = 2300.0
-"""Fibres of the literature whose curl index is told are so long; shorter ones turn by less."""
+"""Fibres of the literature whose curl index is published are so long; shorter ones turn by less."""
 
 MOST_CURL_DEG: Final = 120.0
 

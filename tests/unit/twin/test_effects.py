@@ -102,7 +102,7 @@ def test_without_any_effect_the_lever_formula_is_right_but_for_the_stroke() -> N
 
 
 @pytest.mark.parametrize(("turn_deg", "expected"), [(10, -0.014), (25, -0.086), (45, -0.25)])
-def test_an_arc_is_told_too_soft_by_as_much_as_its_slope_says(
+def test_an_arc_comes_out_too_soft_by_as_much_as_its_slope_says(
     turn_deg: float, expected: float
 ) -> None:
     # Both ways round: a finite push straightens one and bends the other more.
@@ -151,7 +151,7 @@ def test_shear_counts_where_spans_are_short() -> None:
     assert sheared.ei_off > PLAIN.ei_off + 0.01
 
 
-def test_a_fibre_that_relaxes_is_told_too_soft_and_makes_a_loop() -> None:
+def test_a_fibre_that_relaxes_comes_out_too_soft_and_makes_a_loop() -> None:
     slow = lever_fit(with_fibre(relaxation_per_decade=0.1))
     assert slow.ei_off - PLAIN.ei_off == pytest.approx(-0.10, abs=0.04)
     assert slow.loop > 0.01
@@ -231,7 +231,7 @@ def test_a_soft_probe_goes_along_on_a_curled_fibre() -> None:
     assert 0.003 < abs(soft - stiff) < 0.1
 
 
-def test_the_probe_touches_elsewhere_than_where_it_is_seen() -> None:
+def test_the_probe_touches_beside_the_place_where_it_is_seen() -> None:
     shifted = lever_fit(with_world(geometry__probe_contact_um=3.0))
     assert shifted.clamp_um == pytest.approx(PLAIN.clamp_um + 3.0, abs=0.2)
 
@@ -275,7 +275,7 @@ def test_a_sensor_off_its_linearity_shifts_all_forces() -> None:
     assert abs(bent.ei_off - straight.ei_off) > 0.005
 
 
-def test_hysteresis_tells_a_falling_force_from_a_growing_one() -> None:
+def test_hysteresis_parts_a_falling_force_from_a_growing_one() -> None:
     # 1.8 uN at most, against a mean force of some 40 uN.
     loop = lever_fit(with_world(force_sensors__force__hysteresis=0.01), stroke=0.1).loop
     assert -0.05 < loop < -0.01
@@ -396,7 +396,7 @@ def test_distortion_moves_the_corners_and_not_the_middle() -> None:
     assert np.abs(bent.image_px(middle) - straight.image_px(middle)).max() < 1e-6
 
 
-def test_each_run_of_the_zoom_ends_a_little_elsewhere() -> None:
+def test_each_run_of_the_zoom_ends_at_another_scale_and_place() -> None:
     twin = microscope(zoom_scale=0.004, zoom_shift_um=20.0, zoom_focus_um=50.0)
     scene = Scene.from_settings(twin, ManualClock(), 3)
     assert scene.optics is not None and scene.lens is not None
@@ -467,7 +467,7 @@ def test_the_air_changes_with_time() -> None:
 # --- the measurand ----------------------------------------------------------------------------
 
 
-def test_the_truth_tells_what_each_push_is_about() -> None:
+def test_the_truth_records_what_each_push_is_about() -> None:
     fibre = FIBRE.model_copy(
         update={"ei_variation": 0.25, "plane_ratio": 4.0, "orientation_deg": 30.0}
     )
