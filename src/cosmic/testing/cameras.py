@@ -26,11 +26,11 @@ class CameraContract:
 
     Attributes
     ----------
-    patience_s : float
+    first_image_s : float
         How long the first image may take, in wall time.
     """
 
-    patience_s: ClassVar[float] = 5.0
+    first_image_s: ClassVar[float] = 5.0
 
     @abstractmethod
     def make_library(self) -> CameraLibrary:
@@ -53,7 +53,7 @@ class CameraContract:
     def frames(self, camera: Camera, count: int) -> list[Frame]:
         """Return the next frames."""
         found: list[Frame] = []
-        ends_s = WALL.now_s() + self.patience_s + 2.0 * count / max(camera.settings.rate_hz, 1.0)
+        ends_s = WALL.now_s() + self.first_image_s + 2.0 * count / max(camera.settings.rate_hz, 1.0)
         while len(found) < count and WALL.now_s() < ends_s:
             frame = camera.receive(0.5)
             found += [] if frame is None else [frame]
