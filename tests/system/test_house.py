@@ -188,7 +188,9 @@ def _accepts(arguments: list[str]) -> bool:
     """True when the command line knows the sub-command and each option named."""
     options = [word.split("=")[0] for word in arguments if word.startswith("--")]
     sub_command = [word for word in arguments[:1] if not word.startswith("-")]
-    known = _help() + (_help(*sub_command) if sub_command else "")
+    if sub_command == ["simulate"]:  # its options stand with the device that is simulated
+        sub_command = arguments[:2]
+    known = _help() + "".join(_help(*sub_command[: at + 1]) for at in range(len(sub_command)))
     return all(
         re.search(rf"(^|[\s,{{\[]){re.escape(each)}\b", known) for each in options + sub_command
     )
