@@ -72,7 +72,7 @@ def camera(rig: CameraRig) -> Iterator[Camera]:
 def taken(rig: CameraRig, camera: Camera, count: int) -> list[Frame]:
     """Return the next frames that are complete."""
     frames: list[Frame] = []
-    end_s = WALL.now_s() + rig.patience_s + 2.0 * count / rig.rate_hz
+    end_s = WALL.now_s() + rig.timeout_s + 2.0 * count / rig.rate_hz
     while len(frames) < count:
         assert WALL.now_s() < end_s, f"{len(frames)} of {count} frames came; {camera.counters}"
         frame = camera.receive(0.5)
@@ -507,7 +507,7 @@ def test_one_software_trigger_gives_one_frame(rig: CameraRig, camera: Camera) ->
     for _ in range(2):
         asked_s = rig.clock.now_s()
         camera.trigger()
-        frame = camera.receive(rig.patience_s)
+        frame = camera.receive(rig.timeout_s)
         assert frame is not None
         assert frame.time_s >= asked_s
         assert camera.receive(0.1) is None
@@ -527,7 +527,7 @@ def _failure(camera: Camera) -> DeviceError:
 
 
 def _open_again(rig: CameraRig) -> Camera:
-    end_s = WALL.now_s() + rig.patience_s
+    end_s = WALL.now_s() + rig.timeout_s
     while True:
         try:
             camera = rig.library.open(rig.key)

@@ -44,7 +44,7 @@ def devices(package):
     return list(package.devices.values())
 
 
-def test_pylablib_is_told_metres_and_told_where_by_each_class_own_name(pylablib):
+def test_pylablib_gets_metres_and_the_position_by_each_class_own_name(pylablib):
     rig, package = pylablib
     rig.controller.move_to(AT, 120.0, "um", hold_s=0.0)
     rig.controller.step(PICOMOTOR, 30, amplitude_v=50.0, frequency_hz=700)
@@ -54,7 +54,7 @@ def test_pylablib_is_told_metres_and_told_where_by_each_class_own_name(pylablib)
     assert ("speed", 1, 700) in picomotor.axes.calls
 
 
-def test_pi_is_told_millimetres_and_its_servo_is_switched_on_for_it(pi):
+def test_pi_gets_millimetres_and_its_servo_is_switched_on_for_it(pi):
     rig, package = pi
     rig.controller.move_by(AT, -250.0, "um", hold_s=math.inf)
     device = devices(package)[0]
@@ -106,7 +106,7 @@ def test_a_stage_that_cannot_be_homed_says_so(pylablib):
     assert caught.value.fault is DeviceFault.UNSUPPORTED
 
 
-def test_an_unplugged_device_is_told_at_once_and_spares_the_others(made):
+def test_an_unplugged_device_is_reported_at_once_and_spares_the_others(made):
     rig, package = made
     devices(package)[0].axes.gone = True
     with pytest.raises(DeviceError) as caught:

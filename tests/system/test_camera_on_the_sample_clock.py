@@ -73,7 +73,7 @@ def test_a_trigger_for_a_camera_that_is_not_there_or_runs_free_is_a_mistake(
     assert 'give microscope trigger = "hardware"' in capsys.readouterr().err
 
 
-def test_a_trigger_that_is_too_fast_for_the_samples_is_told_with_what_is_possible(
+def test_a_trigger_that_is_too_fast_for_the_samples_is_refused_with_what_is_possible(
     tmp_path: Path,
 ) -> None:
     path = write_platform(tmp_path, rate_hz=400.0)

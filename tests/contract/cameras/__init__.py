@@ -59,7 +59,7 @@ class CameraRig(ABC):
     quiet_rate_hz : float
         A rate that it accepts so low that no frame comes for half a second; for rigs without
         a software trigger that can change their rate. 0: none.
-    patience_s : float
+    timeout_s : float
         How long the first frame may take.
     """
 
@@ -72,7 +72,7 @@ class CameraRig(ABC):
     rate_hz: float = 30.0
     roi: Roi | None = None
     quiet_rate_hz: float = 0.0
-    patience_s: float = 5.0
+    timeout_s: float = 5.0
 
     def __init__(self) -> None:
         self.clock: Clock = RatedClock()
@@ -93,7 +93,7 @@ class CameraRig(ABC):
         raise NotImplementedError
 
     def plug_in(self) -> None:
-        """Bring it back; it may take `patience_s` until it can be opened."""
+        """Bring it back; it may take `timeout_s` until it can be opened."""
         raise NotImplementedError
 
     # --- what the tests use ---------------------------------------------------------------------

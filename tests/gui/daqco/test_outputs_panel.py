@@ -93,7 +93,7 @@ def test_after_a_stop_nothing_can_be_set_before_the_reset(qtbot, panel, port):
     assert panel.rows["piezo"].button.isEnabled() and not panel.reset.isVisible()
 
 
-def test_a_board_that_does_not_answer_is_told(qtbot, panel, port):
+def test_a_board_that_does_not_answer_is_named(qtbot, panel, port):
     port.change(outputs=(replace(PIEZO, value=None, problem="Dev1: the board is gone"), LAMP))
     qtbot.waitUntil(lambda: "the board is gone" in panel.refusal.text())
     assert panel.rows["piezo"].shown.text() == "■ no answer"

@@ -23,7 +23,7 @@ from cosmic.frame.verdict import Reason, refuse
 logger = logging.getLogger(__name__)
 
 LOOK_S: Final = 0.05
-PATIENCE_S: Final = 5.0
+ANSWER_TIMEOUT_S: Final = 5.0
 """So long a board may take until it is given up."""
 MOST_SAMPLES: Final = 1_000_000
 
@@ -236,7 +236,7 @@ class OutputControl(WorkerThread):
     def _drive_all_safe(self, wanted: Sequence[OutputSettings], reason: str) -> None:
         """Drive outputs to their safe values, board by board; who is busy comes later."""
         left = dict.fromkeys(each.board for each in wanted)
-        until_s = WALL.now_s() + PATIENCE_S
+        until_s = WALL.now_s() + ANSWER_TIMEOUT_S
         while left and WALL.now_s() < until_s:
             for board in tuple(left):
                 if not self._locks[board].acquire(timeout=LOOK_S):

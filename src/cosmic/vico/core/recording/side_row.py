@@ -125,9 +125,9 @@ def row_from(texts: Mapping[str, str], axes: Mapping[str, str]) -> SideRow:
         positions = {axis: float(texts[column]) for column, axis in axes.items() if texts[column]}
         # Side files of before lack what the sample clock says.
         known = {
-            name: float(told) if (told := texts.get(name)) else None for name in _CIRCUMSTANCES
+            name: float(text) if (text := texts.get(name)) else None for name in _CIRCUMSTANCES
         }
-        sample = int(told) if (told := texts.get("sample")) else None
+        sample = int(text) if (text := texts.get("sample")) else None
         return SideRow(
             frame_id=int(texts["frame_id"]),
             device_ns=int(texts["device_ns"]) if texts["device_ns"] else None,
