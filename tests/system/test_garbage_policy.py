@@ -63,7 +63,9 @@ def test_a_campaign_without_a_window_has_it(
 
     monkeypatch.setattr(Rig, "campaign", campaign)
     monkeypatch.setattr(campaign_command, "gui_application", lambda: None)
-    unset = dict.fromkeys(("rate", "seed", "sample", "config", "truth", "connect", "certificates"))
+    unset = dict.fromkeys(
+        ("rate", "seed", "sample", "config", "truth", "connect", "certificates", "world")
+    )
     with pytest.raises(Seen):
         campaign_command.run(
             Namespace(recipe=Path("quick"), out=tmp_path / "out", cold=False, **unset)

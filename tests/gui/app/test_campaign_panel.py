@@ -153,7 +153,7 @@ def test_a_finished_fibre_is_shown_and_can_be_replayed(panel, qtbot, tmp_path) -
     press(qtbot, panel.procedure.start)
     panel.refresh()
     panel.board.fibre_chosen.emit(2)
-    assert panel.tabs.currentWidget() is panel.card
+    assert panel.tabs.currentWidget().isAncestorOf(panel.card)
     assert panel.card.card.number == 2
     with qtbot.waitSignal(panel.replay_requested) as signal:
         press(qtbot, panel.card.replay)

@@ -105,7 +105,6 @@ def test_settings_hand_on_limits_and_table() -> None:
     [
         (MotorLensSettings, {"backend": "navitar"}, "needs a port"),
         (LampSettings, {"backend": "brightlight"}, "needs a port"),
-        (LampSettings, {"backend": "navitar", "port": "COM3"}, "simulated"),
         (
             MotorLensSettings,
             {"step": [{"counts": 5, "zoom": 1.0, "scale_um_px": 1.0}] * 2},

@@ -210,6 +210,9 @@ class ApplicationLink:
             self._stops,
             self._renewals,
         )
+        until_s = WALL.now_s() + STOP_LIMIT_S
+        while self._stops.waiting and WALL.now_s() < until_s:  # a stop that was asked for is sent
+            WALL.sleep(0.005)
         for thread in threads:
             thread.request_end()
         for thread in threads:

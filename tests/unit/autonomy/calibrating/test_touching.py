@@ -55,14 +55,28 @@ class Moved(Done):
         """Nothing went wrong."""
 
 
+class Axes:
+    """The axes of a bench, as MiCo has them."""
+
+    settings = SimpleNamespace(positioner=[SimpleNamespace(name="left.gripper", step_um=1.0)])
+
+    def __init__(self, bench: "Bench") -> None:
+        self.collision = bench
+        self._bench = bench
+
+    def __getitem__(self, name: str) -> Axis:
+        return Axis(self._bench, name)
+
+
 class Bench(HandlingContext):
     """Closed jaws, a probe whose tip is off, and the force of one on the other; no platform."""
 
     def __init__(self, *, off_um: float = 1.7, seen_um: float = 1.0, step_um: float = 0.08) -> None:
         clock = ManualClock(auto_advance=True)
         bench: Any = self
+        axes: Any = Axes(self)
         settings = HandlingSettings()
-        super().__init__(bench, Daqco(), bench, settings, clock, bench)  # type: ignore[arg-type]
+        super().__init__(axes, Daqco(), bench, settings, clock, bench)  # type: ignore[arg-type]
         self.at_um = {
             "left.x": 0.0,
             "left.y": 0.0,
@@ -76,13 +90,6 @@ class Bench(HandlingContext):
         self.allowed: list[str] = []
         self.calibration.made[PROBE] = Measured(0.0, 0.1, "px")
         self.calibration.probe_off_um = 0.5, seen_um
-        self.collision = self
-        positioner = SimpleNamespace(name="left.gripper", step_um=1.0)
-        manager = SimpleNamespace(settings=SimpleNamespace(positioner=[positioner]))
-        self.application = SimpleNamespace(manager=manager)
-
-    def __getitem__(self, name: str) -> Axis:
-        return Axis(self, name)
 
     @contextmanager
     def contact(self, name: str) -> Iterator[None]:

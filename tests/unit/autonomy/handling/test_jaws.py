@@ -46,10 +46,9 @@ class Gripper:
 def bench(gripper: Gripper) -> Any:
     mico: Any = {"left.gripper": gripper}
     positioner = SimpleNamespace(name="left.gripper", step_um=1.0)
-    manager = SimpleNamespace(settings=SimpleNamespace(positioner=[positioner]))
 
     class Mico(dict[str, Gripper]):
-        application = SimpleNamespace(manager=manager)
+        settings = SimpleNamespace(positioner=[positioner])
         collision = SimpleNamespace(contact=lambda _: nullcontext())
 
     return SimpleNamespace(
