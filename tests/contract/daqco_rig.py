@@ -12,7 +12,12 @@ from typing_extensions import override
 from contract.station_rig import connected, free_port, listening
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
-from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, ScaleSettings
+from cosmic.daqco.core.settings import (
+    ChannelSettings,
+    DaqcoSettings,
+    OutputSettings,
+    ScaleSettings,
+)
 from cosmic.daqco.hw.interface import Source
 from cosmic.daqco.hw.sim_library import SimulatedLibrary
 from cosmic.frame.clock import WallClock
@@ -25,6 +30,10 @@ from cosmic.frame.network.transport import Transport
 
 LONGEST_SILENCE_S = 1.0
 FORCE = ScaleSettings(name="Probe", unit="uN", coefficients=(0.0, 20.0))
+OUTPUTS = (
+    OutputSettings(name="piezo", board="Dev1", output="ao0", low_v=0.0, high_v=5.0),
+    OutputSettings(name="lamp", board="Dev1", output="port0/line3"),
+)
 
 
 class Knob(Source):
@@ -79,6 +88,11 @@ def settings(folder: Path, channels: int = 2, rate_hz: float = 1000.0) -> DaqcoS
     )
 
 
+def with_outputs(folder: Path) -> DaqcoSettings:
+    """Return `settings` with a voltage "piezo" and a line "lamp"."""
+    return settings(folder).model_copy(update={"output": OUTPUTS})
+
+
 @contextmanager
 def used_locally(wanted: DaqcoSettings) -> Iterator[Home]:
     """Acquire with a simulated board."""
@@ -125,8 +139,8 @@ def used_remotely(
 
 
 @contextmanager
-def daqco_rig(where: str, wanted: DaqcoSettings) -> Iterator[DaqcoRig]:
-    """Yield DAQCo; `where` is "home" or "station"."""
+def daqco_rig(where: str, wanted: DaqcoSettings, *, may_move: bool = False) -> Iterator[DaqcoRig]:
+    """Yield DAQCo; `where` is "home" or "station", `may_move` with the lease."""
     with ExitStack() as stack:
         home = stack.enter_context(used_locally(wanted))
         if where == "home":
@@ -136,6 +150,8 @@ def daqco_rig(where: str, wanted: DaqcoSettings) -> Iterator[DaqcoRig]:
         station = stack.enter_context(hosted(home, endpoint))
         transport = stack.enter_context(connected(endpoint))
         remote = stack.enter_context(used_remotely(transport))
+        if may_move:
+            transport.take_lease()
         yield DaqcoRig(home, remote.api, remote, station)
 
 

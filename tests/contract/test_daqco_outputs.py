@@ -7,9 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contract.daqco_rig import DaqcoRig, daqco_rig, hosted, settings, used_locally, used_remotely
+from contract.daqco_rig import (
+    DaqcoRig,
+    daqco_rig,
+    hosted,
+    used_locally,
+    used_remotely,
+    with_outputs,
+)
 from contract.station_rig import connected, free_port, wait_until
-from cosmic.daqco.core.settings import DaqcoSettings, OutputSettings
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import (
     ArgumentError,
@@ -20,15 +26,6 @@ from cosmic.frame.errors import (
     StoppedError,
 )
 from cosmic.frame.network.transport import Transport
-
-OUTPUTS = (
-    OutputSettings(name="piezo", board="Dev1", output="ao0", low_v=0.0, high_v=5.0),
-    OutputSettings(name="lamp", board="Dev1", output="port0/line3"),
-)
-
-
-def with_outputs(folder: Path) -> DaqcoSettings:
-    return settings(folder).model_copy(update={"output": OUTPUTS})
 
 
 @contextmanager

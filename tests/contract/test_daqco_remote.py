@@ -6,9 +6,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from threading import Event
 
+import numpy as np
 import pytest
 
-from contract.daqco_rig import DaqcoRig, daqco_rig, settings
+from contract.daqco_rig import DaqcoRig, daqco_rig, with_outputs
 from contract.station_rig import wait_until
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.api.files import NamedFile
@@ -17,6 +18,7 @@ from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.limits import Crossing
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import LimitSettings
+from cosmic.frame.clock import WALL
 from cosmic.frame.declaration import declaration_of
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable, RecordingError
 from cosmic.frame.file_names import NameOption
@@ -30,7 +32,7 @@ def rig(
 ) -> Iterator[DaqcoRig]:
     # A machine that is busy with other tests falls silent for a moment now and then.
     monkeypatch.setattr("cosmic.daqco.api.limit_watch.SILENCE_LIMIT_S", 5.0)
-    with daqco_rig(request.param, settings(tmp_path)) as made:
+    with daqco_rig(request.param, with_outputs(tmp_path), may_move=True) as made:
         yield made
 
 
@@ -122,6 +124,23 @@ def _export_something(rig: DaqcoRig) -> None:
     rig.daqco.export(file, file.with_suffix(".csv")).wait(10.0)
 
 
+def _tare(rig: DaqcoRig) -> float:
+    assert wait_until(lambda: rig.daqco.latest_chunk is not None)  # a new scale began anew
+    return rig.daqco.tare("force")
+
+
+def _play_something(rig: DaqcoRig) -> float:
+    made_hz = rig.daqco.play("piezo", np.array([1.0, 2.0]), 200.0)
+    assert wait_until(lambda: rig.home.library.output_level("Dev1", "ao0").at(WALL.now_s()) == 2.0)
+    return made_hz
+
+
+def _stop_outputs(rig: DaqcoRig) -> str:
+    rig.daqco.stop_outputs("enough")
+    assert wait_until(lambda: rig.daqco.outputs_stopped == "enough")
+    return rig.daqco.outputs_stopped
+
+
 FORCE_LIMIT = LimitSettings(channel="force", high=90.0, armed=True)
 GIVEN: dict[str, Callable[[DaqcoRig], object]] = {
     "stop": lambda rig: rig.daqco.stop(),
@@ -130,7 +149,7 @@ GIVEN: dict[str, Callable[[DaqcoRig], object]] = {
         rig.daqco.settings.model_copy(update={"refresh_hz": 10.0})
     ),
     "set_scale": lambda rig: rig.daqco.set_scale("channel1", Scale("Lamp", "mW", (1.0, 2.0))),
-    "tare": lambda rig: rig.daqco.tare("force"),
+    "tare": _tare,
     "start_recording": lambda rig: rig.daqco.start_recording(rig.daqco.directory / "all.h5"),
     "mark": lambda rig: rig.daqco.mark("here"),
     "stop_recording": lambda rig: rig.daqco.stop_recording(),
@@ -145,6 +164,11 @@ GIVEN: dict[str, Callable[[DaqcoRig], object]] = {
     "reset_limit": lambda rig: rig.daqco.reset_limit("force"),
     "disarm_limit": lambda rig: rig.daqco.disarm_limit("force"),
     "remove_limit": lambda rig: rig.daqco.remove_limit("force"),
+    "set_output": lambda rig: rig.daqco.set_output("piezo", 1.5),
+    "set_line": lambda rig: rig.daqco.set_line("lamp", high=True),
+    "play": _play_something,
+    "stop_outputs": _stop_outputs,
+    "reset_outputs": lambda rig: rig.daqco.reset_outputs(),
 }
 
 
@@ -171,6 +195,10 @@ def test_every_command_that_is_declared_is_carried_out(rig: DaqcoRig) -> None:
         assert [event.text for event in recording.events] == ["here"]
     assert rig.daqco.settings.refresh_hz == 10.0
     assert rig.daqco.limits == ()
+    assert found["play"] == pytest.approx(200.0)
+    assert rig.home.library.line_is_high("Dev1", "port0/line3") is False  # safe after the stop
+    assert rig.home.library.output_level("Dev1", "ao0").at(WALL.now_s()) == 0.0
+    assert wait_until(lambda: rig.daqco.outputs_stopped == "")
     assert not rig.home.failures
 
 

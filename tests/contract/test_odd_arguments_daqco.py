@@ -7,18 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contract.daqco_rig import DaqcoRig, hosted, settings, used_locally, used_remotely
+from contract.daqco_rig import DaqcoRig, hosted, used_locally, used_remotely, with_outputs
 from contract.station_rig import connected, free_port, wait_until
 from cosmic.daqco.core.scale import Scale
-from cosmic.daqco.core.settings import LimitSettings, OutputSettings
+from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.clock import WALL
 from cosmic.frame.file_names import NameOption
 from system.odd_arguments import LEFT_OUT, calls_of, complaint, tried
 
-OUTPUTS = (
-    OutputSettings(name="piezo", board="Dev1", output="ao0", low_v=0.0, high_v=5.0),
-    OutputSettings(name="lamp", board="Dev1", output="port0/line3"),
-)
 LONGEST_S = 60.0
 """Nothing hangs: all that is tried with one thing takes less."""
 
@@ -27,9 +23,8 @@ LONGEST_S = 60.0
 def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[DaqcoRig]:
     monkeypatch.chdir(tmp_path)
     endpoint = f"tcp/127.0.0.1:{free_port()}"
-    wanted = settings(tmp_path).model_copy(update={"output": OUTPUTS})
     with (
-        used_locally(wanted) as home,
+        used_locally(with_outputs(tmp_path)) as home,
         hosted(home, endpoint) as station,
         connected(endpoint) as transport,
         used_remotely(transport) as remote,

@@ -23,7 +23,7 @@ SENSIBLE: dict[str, object] = {
     "position": 0.0, "value": 1.0, "targets": {"left.x": 10.0}, "distances": {"left.x": 1.0},
     "first": "left.x", "second": "right.x", "one": "left_x", "other": "plate", "steps": 1,
     "frequency_hz": 5000, "direction": "forward", "jog.direction": 1, "follow.wait": False,
-    "go.wait": False, "callback": None, "zero": 0.0, "timeout_s": 0.01, "speed": 1.0,
+    "go.wait": False, "callback": None, "code": 1, "zero": 0.0, "timeout_s": 0.01, "speed": 1.0,
 }  # fmt: skip
 
 LONG = {"begin_initialisation", "begin_search", "begin_rescan"}

@@ -29,6 +29,8 @@ LEFT_OUT: Final = {
     "close", "shut_down", "join", "run_here", "rescan", "release_control", "take_control",
     "initialise", "calibrate_stage", "find_rotation_centre",
 }  # fmt: skip
+STORED: Final = {"set_sensor_type", "set_safe_direction"}
+"""What they change in the controller leaves an axis without a position, or takes it away."""
 INSIDE: Final = (
     AttributeError, ValueError, LookupError, ArithmeticError, RecursionError, AssertionError,
     UnicodeError, OSError, NameError, NotImplementedError, MemoryError,

@@ -3,6 +3,7 @@
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.arguments import checked
 from cosmic.frame.config import read_toml
 from cosmic.frame.errors import ArgumentError, ConfigError
-from system.odd_arguments import Call, calls_of, complaint, tried
+from system.odd_arguments import LEFT_OUT, STORED, Call, calls_of, complaint, tried
 
 HEAD = "cosmic-trajectory 1\nplatform FiberStation\n"
 THINGS: dict[str, Callable[[cosmic.Rig], object]] = {
@@ -93,7 +94,7 @@ def test_odd_arguments_are_named_and_break_nothing(
 ) -> None:
     wrong: dict[str, None] = {}
     tries = 0
-    for call in calls_of(name, THINGS[name](rig), sensible):
+    for call in calls_of(name, THINGS[name](rig), sensible, LEFT_OUT | STORED):
         for link in rig.mico.links:
             rig.mico.unlink(link.first)
         if call.where.endswith(".stop"):
@@ -105,6 +106,24 @@ def test_odd_arguments_are_named_and_break_nothing(
     rig.daqco.stop_recording()
     assert not wrong, "\n".join(wrong)
     assert tries > 0
+
+
+@pytest.mark.parametrize("consent", [False, True])
+def test_odd_arguments_of_what_a_controller_stores_are_named(consent: bool) -> None:
+    with cosmic.connect(applications=("mico",), rate=50.0) as rig:
+        axis = rig.mico["left.x"]
+        given: dict[str, object] = {"code": 1, "direction": "forward", "consent": consent}
+        calls = [
+            Call(f"axis.{name}", partial(getattr(axis, name), consent=consent), given)
+            for name in sorted(STORED)
+        ]
+        wrong = [
+            found
+            for call in calls
+            for parameter, odd, error in tried(call)
+            if (found := complaint(call, parameter, odd, error))
+        ]
+    assert not wrong, "\n".join(wrong)
 
 
 def test_stop_takes_any_reason_and_stops(rig: cosmic.Rig) -> None:

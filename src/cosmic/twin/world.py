@@ -186,13 +186,17 @@ def load_world(name: str, folder: Path) -> World:
     Raises
     ------
     ConfigError
-        There is no such world, or its file is wrong.
+        There is no such world, or its file is wrong or cannot be read.
     """
     if name == PLAIN:
         return World(about="As twin.toml has it.")
     for each in (folder, shipped_config_dir()):
         path = each / FOLDER / f"{name}.toml"
-        if path.is_file():
+        try:
+            found = path.is_file()
+        except OSError as exc:  # such as a name that is too long for a file
+            raise ConfigError(f"world: {name[:80]!r} cannot be read: {exc.strerror}") from exc
+        if found:
             return load_model(path, World)
     known = ", ".join(world_names(folder))
     raise ConfigError(f"world: there is no world {name!r}; known: {known}")

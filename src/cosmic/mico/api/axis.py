@@ -12,6 +12,7 @@ from typing_extensions import override
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.declaration import Declared, command, state
 from cosmic.frame.errors import (
+    ArgumentError,
     CosmicError,
     MoveRefused,
     NotAvailable,
@@ -768,10 +769,23 @@ class Axis(AxisShape, Declared):
 
         Afterwards the position is unknown: calibrate and reference it.
 
-        Parameters, Raises
-        ------------------
-        As `set_sensor_type`.
+        Parameters
+        ----------
+        direction : str
+            "forward" or "backward".
+        consent : bool
+            The operator agreed.
+
+        Raises
+        ------
+        ArgumentError
+            `direction` is neither.
+        CosmicError
+            As `set_sensor_type`.
         """
+        if direction not in list(Direction):
+            text = f"{self._name}: direction must be 'forward' or 'backward'"
+            raise ArgumentError(f"{text}, not {one_line(direction)!r}")
         self._set_up(Direction(direction), consent=consent)
 
     def _set_up(self, change: int | Direction, *, consent: bool) -> None:
@@ -780,6 +794,8 @@ class Axis(AxisShape, Declared):
                 f"{self._name}: this changes what the controller stores, and where the axis goes "
                 "to be referenced; say consent=True when nothing is in its way"
             )
+        if self._far is not None:
+            raise NotAvailable(f"{self._name}: it is set up at the station that has it")
         device = self._manager.device(self._name)
         device.set_up(self._channel, change).wait(self._manager.settings.watch.answer_s)
 

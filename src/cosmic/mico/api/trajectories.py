@@ -70,6 +70,10 @@ class Platform(Recordable, Protocol):
         """Return what a trajectory is checked against."""
 
 
+_OF_A_PLATFORM: Final = ("settings", "recordings", "source", "pose", "facts")
+"""What tells one from what is none: a protocol with properties cannot be asked."""
+
+
 @checked_class
 class Trajectories(Declared):
     """Records, reads, rehearses and runs trajectories; any thread.
@@ -93,6 +97,8 @@ class Trajectories(Declared):
 
     def belong_to(self, platform: Platform) -> None:
         """Read and check for this platform; for whoever makes a proxy."""
+        if not all(hasattr(type(platform), each) for each in _OF_A_PLATFORM):
+            raise TypeError(f"platform must be a MiCo, not {str(platform)[:60]}")
         self._platform = platform
 
     @property
