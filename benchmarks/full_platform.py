@@ -31,7 +31,7 @@ from cosmic.daqco.gui.main_widget import make_daqco_gui
 from cosmic.frame.log import RingBufferHandler, set_up_logging
 from cosmic.frame.threads import declare_gui_thread
 from cosmic.mico.gui.mico_widget import make_mico_gui
-from cosmic.mico.hw import sim_scu3d
+from cosmic.mico.hw import sim_controllers
 from cosmic.vico.gui.vico_gui import make_vico_gui
 
 SAMPLE, RECIPE = "forty-dry", "bend-test"
@@ -62,7 +62,7 @@ class FullStand(Stand):
 def full_platform(*, campaign: bool = True, seed: int = 1) -> Iterator[FullStand]:
     """Set up the shipped platform with its whole window, recording and with its camera live."""
     app = application()
-    load = sim_scu3d.load_simulated_library
+    load = sim_controllers.load_simulated_scu3d
     traced: list[Any] = []
 
     def traced_library(**more: Any) -> TracedLibrary:
@@ -74,7 +74,7 @@ def full_platform(*, campaign: bool = True, seed: int = 1) -> Iterator[FullStand
         ring = RingBufferHandler()
         at_end.callback(set_up_logging(ring, file=folder / "cosmic.log"))
         beside = at_end.enter_context(_campaign(folder, seed)) if campaign else None
-        with patch.object(sim_scu3d, "load_simulated_library", traced_library):
+        with patch.object(sim_controllers, "load_simulated_scu3d", traced_library):
             platform = build_platform(
                 sample=SAMPLE,
                 seed=seed,

@@ -17,11 +17,10 @@ from cosmic.app.cli import main
 from cosmic.app.windows import run_window
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.mico.core.motion.positioner import Status
-from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 
 
 class Watch(QObject):
-    """Waits for a card painted after every axis had its position, and closes the window."""
+    """Waits for the table painted after every axis had its position, and closes the window."""
 
     def __init__(self, window: OperatorWindow) -> None:
         super().__init__(window)
@@ -33,14 +32,14 @@ class Watch(QObject):
 
     def _look(self) -> None:
         gui = self._window.mico_gui
-        if gui is None or not gui.cards:
+        if gui is None or not gui.table.rows:
             return
         read = all(axis.details.position is not None for axis in gui.mico)
         # The feed shows a state at most 33 ms after it came.
-        if read and all(shown(card) for card in gui.cards.values()):
+        if read and all(row.position.text != "–" for row in gui.table.rows.values()):
             self._timer.stop()
-            next(iter(gui.cards.values())).installEventFilter(self)
-            gui.update()
+            gui.table.installEventFilter(self)
+            gui.table.update()
 
     @override
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -74,11 +73,6 @@ class Watch(QObject):
             times_s["usable"] = time.monotonic() - BEGAN_S
             times_s["cpu"] = time.process_time()
             self._window.close()
-
-
-def shown(card: PositionerBaseGUI) -> bool:
-    """Return whether the card shows a position."""
-    return card._position.text != "–"
 
 
 def _watched(window: OperatorWindow) -> None:
