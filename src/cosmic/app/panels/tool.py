@@ -320,9 +320,9 @@ class ToolPanel(QWidget):
             button = styled(push_button(text, f"{text} the jaws by the step"), "narrow")
             button.setAccessibleName(f"{axis.name} {text}")
             button.clicked.connect(lambda _=False, d=direction: self.move_once(axis.name, d))
-            line.addWidget(button, 1)
+            line.addWidget(button)
         width = QuantityField("um", low=0.0, name=f"Opening of {axis.name}; Enter goes there")
-        named(width, "gripperWidth").setMinimumWidth(8 * STEP_PX)
+        named(width, "gripperWidth").setMinimumWidth(9 * STEP_PX)
         state = axis.details
         if state.shown_position is not None:
             width.set_value(round(state.shown_position))
