@@ -196,7 +196,8 @@ def test_every_command_that_is_declared_is_carried_out(rig: DaqcoRig) -> None:
     assert rig.daqco.settings.refresh_hz == 10.0
     assert rig.daqco.limits == ()
     assert found["play"] == pytest.approx(200.0)
-    assert rig.home.library.line_is_high("Dev1", "port0/line3") is False  # safe after the stop
+    library = rig.home.library
+    assert wait_until(lambda: library.line_is_high("Dev1", "port0/line3") is False)  # by the stop
     assert rig.home.library.output_level("Dev1", "ao0").at(WALL.now_s()) == 0.0
     assert wait_until(lambda: rig.daqco.outputs_stopped == "")
     assert not rig.home.failures

@@ -46,6 +46,10 @@ class PseudoTerminal(End):
         There are no pseudo terminals on this system, or the link cannot be made.
     """
 
+    _master: int
+    _slave: int
+    _link: Path
+
     def __init__(self, link: Path) -> None:
         if sys.platform == "win32":
             raise NotAvailable(
