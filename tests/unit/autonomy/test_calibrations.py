@@ -1,5 +1,8 @@
 """Which map is used where, what is kept in files, and where tools are expected."""
 
+import gc
+import weakref
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -140,3 +143,21 @@ def test_a_tool_must_point_somewhere(forward: tuple[float, float]) -> None:
 def test_a_tool_cannot_use_one_axis_twice() -> None:
     with pytest.raises(ValueError, match="two parts"):
         ToolSettings.model_validate(TOOL.model_dump() | {"y_axis": "left.x"})
+
+
+class Kept:
+    """Stands for an image."""
+
+
+def test_whoever_finds_no_map_keeps_nothing_alive_until_a_collection(known: Calibrations) -> None:
+    def look() -> "weakref.ref[Kept]":
+        image = Kept()
+        with suppress(NotAvailable):
+            known.find("top", 1.0, 0.0)
+        return weakref.ref(image)
+
+    gc.disable()
+    try:
+        assert look()() is None
+    finally:
+        gc.enable()
