@@ -73,8 +73,8 @@ class ScaleBar(Layer):
         metrics = QFontMetricsF(font)
         width = max(self.length_px, metrics.horizontalAdvance(self.text)) + 2 * STEP_PX
         height = metrics.height() + 2 * STEP_PX
-        bottom = room.bottom() - EDGE_PX
-        box = QRectF(room.right() - EDGE_PX - width, bottom - height, width, height)
+        # The scene's inset and the bar of the camera lie over the lower edge.
+        box = QRectF(room.left() + EDGE_PX, room.top() + EDGE_PX, width, height)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(HALO)
         painter.drawRoundedRect(box, 3.0, 3.0)
