@@ -246,6 +246,7 @@ class Recorder:
         application = self._application
         channels = tuple(each for each in application.settings.channel if each.active)
         scales = application.scales()
+        positions = () if self.position_source is None else self.position_source()
         return RecordingHeader(
             rate_hz=application.rate_hz,
             channels=channels,
@@ -254,6 +255,7 @@ class Recorder:
             start_s=application.clock.now_s(),
             software=self._software,
             configuration=self._configuration,
+            axes=tuple((each.axis, each.unit) for each in positions),
         )
 
     def _forbid(self, settings: DaqcoSettings) -> None:

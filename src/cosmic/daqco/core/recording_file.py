@@ -10,6 +10,7 @@ import numpy as np
 
 from cosmic.daqco.core import recording_format as form
 from cosmic.daqco.core.chunk import DataChunk
+from cosmic.daqco.core.nexus import NexusEntry
 from cosmic.daqco.core.recording_format import (
     AxisPosition,
     Overrun,
@@ -65,7 +66,10 @@ class RecordingFile:
         self._header = header
         self._names = header.names
         self._block = np.zeros((len(self._names), block_samples(header.rate_hz)))
+        self._values = np.zeros_like(self._block)
+        self._times = np.zeros(self._block.shape[1])
         self._filled = 0
+        self._scaled = 0
         self._flushed = 0
         self._columns = 0
         self._next: tuple[int, float] | None = None
@@ -78,7 +82,8 @@ class RecordingFile:
         self._hold: FileHold | None = None
         self._file = self._created(overwrite=overwrite)
         self._size_bytes = 0
-        self._room = Room(self._file, path, 2 * self._block.nbytes + TABLES_BYTES)
+        held_bytes = self._block.nbytes + self._values.nbytes + self._times.nbytes
+        self._room = Room(self._file, path, 2 * held_bytes + TABLES_BYTES)
         self._begin()
 
     @property
@@ -148,7 +153,9 @@ class RecordingFile:
 
     def add_positions(self, positions: Iterable[AxisPosition]) -> None:
         """Add where axes were; an axis is known from its first row on."""
-        for each in positions:
+        rows = tuple(positions)
+        self._nexus.add_positions(rows)
+        for each in rows:
             if each.axis not in self._axes:
                 self._axes[each.axis] = len(self._axes)
                 name = form.encoded(each.axis, form.NAME_BYTES)
@@ -168,6 +175,7 @@ class RecordingFile:
             self._write_block()
             self._flushed = self._filled
         self._take_room()
+        self._nexus.flush()
         self._write_tables()
         self._file.flush()
 
@@ -241,6 +249,7 @@ class RecordingFile:
         kind = form.text_type(len(text))
         file.create_dataset("configuration", data=np.array(text, dtype=kind), dtype=kind)
         file.create_dataset("complete", data=np.uint8(0))
+        self._nexus = NexusEntry(file, header, block, self._path)
         self._note_scales(header.scales, header.start_s)
         file.swmr_mode = True  # with it HDF5 lets go of its own lock
         self._hold = FileHold(self._path)
@@ -254,6 +263,7 @@ class RecordingFile:
         self._next = (chunk.first_sample + chunk.samples, chunk.end_time_s)
 
     def _note_scales(self, scales: tuple[Scale, ...], time_s: float) -> None:
+        self._scale_block()
         self._version += 1
         self._scales = scales
         for channel, scale in enumerate(scales):
@@ -273,17 +283,34 @@ class RecordingFile:
             count = min(width - self._filled, chunk.samples - taken)
             end = self._filled + count
             self._block[:, self._filled : end] = chunk.volts[:, taken : taken + count]
+            into_s = chunk.time_s - self._header.start_s
+            self._times[self._filled : end] = (
+                into_s + np.arange(taken, taken + count) / chunk.rate_hz
+            )
             self._filled, taken = end, taken + count
             if self._filled == width:
                 self._write_block()
                 self._columns += width
-                self._filled = self._flushed = 0
+                self._filled = self._flushed = self._scaled = 0
+
+    def _scale_block(self) -> None:
+        """Make values of the volts that came since, by the scales in force."""
+        span = slice(self._scaled, self._filled)
+        pairs = zip(self._scales, self._header.scales, strict=False)  # none before the first
+        for channel, (scale, first) in enumerate(pairs):
+            same = scale.unit == first.unit
+            self._values[channel, span] = (
+                scale.apply(self._block[channel, span]) if same else np.nan
+            )
+        self._scaled = self._filled
 
     def _write_block(self) -> None:
         self._take_room()
+        self._scale_block()
         self._volts.resize(self.samples, axis=1)
         for channel, row in enumerate(self._block):
             self._volts.id.write_direct_chunk((channel, self._columns), row)
+        self._nexus.write(self._columns, self.samples, self._times, self._values)
 
     def _take_room(self) -> None:
         if self._closing:  # what the margin is for

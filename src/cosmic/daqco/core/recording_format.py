@@ -32,6 +32,8 @@ class RecordingHeader:
         Platform time.
     configuration : str
         Text of platform.toml.
+    axes : tuple of tuple
+        Name and unit of each axis whose positions get a dataset of their own.
     """
 
     rate_hz: float
@@ -41,6 +43,7 @@ class RecordingHeader:
     start_s: float
     software: str = ""
     configuration: str = ""
+    axes: tuple[tuple[str, str], ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -50,7 +53,7 @@ class RecordingHeader:
     @property
     def bytes_per_s(self) -> float:
         """How fast the file grows, about."""
-        return len(self.channels) * self.rate_hz * 8.0
+        return (2 * len(self.channels) + 1) * self.rate_hz * 8.0
 
 
 @dataclass(frozen=True, slots=True)
