@@ -76,6 +76,11 @@ class Platform:
         return not real_here and all(each.facts.simulated for each in self.remote.stations)
 
     @property
+    def world(self) -> str:
+        """Name of the simulated world; empty where no part of the twin is here."""
+        return "" if self.scene is None else self.scene.world
+
+    @property
     def own(self) -> dict[str, CosmicApplicationBase]:
         """The applications that run in this process, by name."""
         return {name: each for name, each in self._all.items() if name not in self.remote.host_of}

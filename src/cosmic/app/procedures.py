@@ -37,6 +37,7 @@ def campaign_on(
         hardware=TWIN if platform.simulated else platform.file.platform.name,
         rate=platform.clock.rate,
         seed=platform.seed if platform.simulated else 0,
+        world=platform.world if platform.simulated else "",
         versions={"CoSMic": __version__, "Python": computer.python_version()},
     )
     return open_campaign(read, Path(folder), host)

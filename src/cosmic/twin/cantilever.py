@@ -156,18 +156,19 @@ class Cantilever:
         """Return height, forces and arc of one load at the places wanted; nan where none is."""
         good = pushed.met[number]
         x = pushed.x[number] + self._depth
-        rises = good & (x > np.maximum.accumulate(np.concatenate([[0.0], x[:-1]])))
-        last = len(x) if rises.all() else int(rises.argmin())
-        if last < 4:
+        # Pushed so hard near the clamp, a probe that gives way along the fibre may stand behind it.
+        run = _longest_rise(x, good & (x > 0.0))
+        if run.stop - run.start < 4:
             return tuple(np.full((4, len(wanted)), math.nan))
-        logs = np.log(x[:last])
+        x = x[run]
+        logs = np.log(x)
         length = np.exp(wanted)
         out = (wanted < logs[0] - 0.2) | (wanted > logs[-1] + 1e-9)
         values = [
-            _smooth(logs, pushed.y[number, :last], wanted),
-            _smooth(logs, pushed.force[number, :last] * x[:last] ** 2, wanted) / self._ei,
-            _smooth(logs, pushed.along[number, :last] * x[:last] ** 2, wanted) / self._ei,
-            _smooth(logs, pushed.arcs[:last] / x[:last], wanted) * length,
+            _smooth(logs, pushed.y[number, run], wanted),
+            _smooth(logs, pushed.force[number, run] * x**2, wanted) / self._ei,
+            _smooth(logs, pushed.along[number, run] * x**2, wanted) / self._ei,
+            _smooth(logs, pushed.arcs[run] / x, wanted) * length,
         ]
         return tuple(np.where(out, math.nan, each) for each in values)
 
@@ -247,6 +248,14 @@ class _Pushed:
     along: Floats
     arcs: Floats
     met: npt.NDArray[np.bool_]
+
+
+def _longest_rise(x: Floats, good: npt.NDArray[np.bool_]) -> slice:
+    """Return the longest run of places that are good and lie one after the other."""
+    follows = good[1:] & good[:-1] & (np.diff(x) > 0.0)
+    edges = np.concatenate([[0], np.flatnonzero(~follows) + 1, [len(x)]])
+    longest = int(np.diff(edges).argmax())
+    return slice(int(edges[longest]), int(edges[longest + 1]))
 
 
 def _last(deflections: Floats, forces: Floats, arcs: Floats, free_um: float) -> int:

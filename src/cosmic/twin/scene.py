@@ -88,6 +88,8 @@ class Scene:
         Told what happens.
     plates : Plates or None
         What lies on later plates.
+    world : str
+        Name of the world it was drawn from; "" where nobody said.
     """
 
     def __init__(
@@ -107,10 +109,12 @@ class Scene:
         faults: TwinFaults | None = None,
         truth: Truth = NO_TRUTH,
         plates: Plates | None = None,
+        world: str = "",
     ) -> None:
         self.settings = settings
         self.clock = clock
         self.seed = seed
+        self.world = world
         self.stages = dict(stages)
         self.wiring = wiring
         self.makes = makes or (DEFAULT_MAKE,) * len(wiring)
@@ -153,7 +157,7 @@ class Scene:
         sample : str
             Name of what lies on the plate, for the truth.
         world : str
-            Name of the world, for the truth.
+            Name of the world it was drawn from.
         plates : Plates or None
             What lies on later plates; None: there is only this one.
         truth : Truth
@@ -202,6 +206,7 @@ class Scene:
             faults=faults,
             truth=truth,
             plates=plates,
+            world=world,
         )
 
     @classmethod

@@ -51,11 +51,12 @@ def recipe(tmp_path: Path) -> Path:
 @pytest.fixture
 def platforms(monkeypatch: pytest.MonkeyPatch, qapp: object) -> SimpleNamespace:
     """Stands for the platform: what it was begun with, and how the campaign on it ends."""
-    made = SimpleNamespace(seeds=[], phase=CampaignPhase.ENDED, start=lambda: None)
+    made = SimpleNamespace(seeds=[], worlds=[], phase=CampaignPhase.ENDED, start=lambda: None)
 
     @contextmanager
-    def connect(*_: object, seed: int, **__: object) -> Iterator[Any]:
+    def connect(*_: object, seed: int, world: str | None, **__: object) -> Iterator[Any]:
         made.seeds.append(seed)
+        made.worlds.append(world)
         campaign = SimpleNamespace(
             phase=made.phase, over=True, end_reason="so it was", operation="", left_s=math.nan,
             progress=progress((), 3.0), start=lambda: made.start(), join=lambda: None,
@@ -115,6 +116,30 @@ def test_another_seed_than_that_of_the_campaign_is_refused(
     CampaignStore.create(out, info).close()
     assert main(["campaign", str(recipe), "--out", str(out), "--seed", "8"]) == 1
     assert re.search("twin with seed 7, and this one has seed 8", capsys.readouterr().err)
+
+
+def test_a_campaign_is_resumed_in_its_own_world_unless_another_is_named(
+    recipe: Path, tmp_path: Path, platforms: SimpleNamespace
+) -> None:
+    out, text = tmp_path / "out", recipe.read_text(encoding="utf-8")
+    info = CampaignInfo(
+        "short", "transport", "three", text, "2026-11-21T12:00:00+00:00", seed=7, world="harsh"
+    )
+    CampaignStore.create(out, info).close()
+    main(["campaign", str(recipe), "--out", str(out)])
+    main(["campaign", str(recipe), "--out", str(out), "--world", "plain"])
+    main(["campaign", str(recipe), "--out", str(tmp_path / "another")])
+    assert platforms.worlds == ["harsh", "plain", None]
+
+
+def test_another_world_than_that_of_the_campaign_is_refused(
+    recipe: Path, tmp_path: Path, qapp: object, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["campaign", str(recipe), "--out", str(out), "--world", "friendly"]) == 0
+    assert CampaignReader(out).info().world == "friendly"
+    assert main(["campaign", str(recipe), "--out", str(out), "--world", "harsh"]) == 1
+    assert "Resume with --world friendly" in capsys.readouterr().err
 
 
 def test_the_log_of_a_campaign_is_kept_in_its_folder_and_warnings_are_reported_at_once(

@@ -15,9 +15,11 @@ def world_of(tmp_path: Path, **options: str) -> str:
     return read_truth(truth).world
 
 
-def test_the_friendly_world_is_the_default(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_realistic_world_is_the_default(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv("COSMIC_WORLD")
-    assert world_of(tmp_path) == "friendly"
+    assert world_of(tmp_path) == "realistic"
 
 
 def test_the_variable_goes_before_the_file_and_the_argument_before_both(

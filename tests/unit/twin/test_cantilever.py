@@ -134,6 +134,20 @@ def test_a_fibre_slides_off_when_the_bow_needs_more_than_there_is() -> None:
     assert along == pytest.approx(402.0, abs=0.3)
 
 
+@pytest.mark.parametrize("span_um", [120.0, 200.0, 600.0])
+@pytest.mark.parametrize("friction", [-0.4, -0.2, 0.2, 0.4])
+def test_a_soft_probe_that_rubs_bends_the_fibre_and_does_not_slide_off(
+    span_um: float, friction: float
+) -> None:
+    line = np.array([[0.0, 0.0], [1700.0, 0.0]])
+    soft = curve(
+        span_um, line=line, depth_um=30.0, radius_um=17.0, friction=friction, probe_un_um=10.0
+    )
+    stiff = 3.0 * EI / (span_um + 30.0) ** 3
+    assert soft.reach_um > 0.08 * span_um
+    assert soft.force_un(3.0) == pytest.approx(3.0 * stiff, rel=0.2)
+
+
 def test_curves_are_finite_and_rise() -> None:
     shapes = [None, arc(1200.0, 70.0, 300), arc(1200.0, -70.0, 300), arc(600.0, 100.0, 60)]
     for line in shapes:

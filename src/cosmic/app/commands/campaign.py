@@ -13,7 +13,7 @@ from cosmic.app.connect import connect
 from cosmic.app.panels.campaign.output import gui_application, write_output
 from cosmic.app.stations.address import endpoints_of
 from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
-from cosmic.autonomy.campaign.opening import read_recipe, recorded_seed
+from cosmic.autonomy.campaign.opening import read_recipe, recorded
 from cosmic.autonomy.campaign.recipe import Recipe
 from cosmic.autonomy.campaign.records import TWIN
 from cosmic.frame.clock import WALL
@@ -40,10 +40,13 @@ def run(chosen: argparse.Namespace) -> int:
     application = gui_application()  # noqa: F841 - Qt forgets one that nobody holds
     twin = recipe.file.twin
     rate = twin.rate if chosen.rate is None else chosen.rate
-    seed = chosen.seed
-    if seed is None:  # a campaign that is gone on with has the fibres of its own seed
-        known = recorded_seed(chosen.out)
-        seed = twin.seed if known is None else known
+    # A campaign that is gone on with has the fibres of its own seed, in its own world.
+    known = recorded(chosen.out)
+    seed, world = chosen.seed, chosen.world
+    if seed is None:
+        seed = twin.seed if known is None else known.seed
+    if world is None and known is not None and known.hardware == TWIN:
+        world = known.world or None
     sample = chosen.sample or recipe.file.sample.name or None
     with (
         ExitStack() as at_end,
@@ -54,7 +57,7 @@ def run(chosen: argparse.Namespace) -> int:
             seed=seed,
             sample=sample,
             truth=chosen.truth,
-            world=chosen.world,
+            world=world,
             stations=endpoints_of(chosen),
             certificates=chosen.certificates,
         ) as rig,

@@ -36,6 +36,8 @@ class CampaignHost:
         "digital twin", or the platform's name.
     seed : int
         Of everything random in the twin that runs: what is recorded, whatever the recipe says.
+    world : str
+        The twin's; empty on hardware.
     """
 
     rig: Applications
@@ -45,6 +47,7 @@ class CampaignHost:
     rate: float = 1.0
     seed: int = 0
     versions: Mapping[str, str] = field(default_factory=dict)
+    world: str = ""
 
 
 def read_recipe(path: Path) -> Recipe:
@@ -143,17 +146,23 @@ def _check_same(info: CampaignInfo, recipe: Recipe, folder: Path, host: Campaign
             f"{host.seed}: its fibres differ. Resume with seed {info.seed}, or name another "
             "folder"
         )
+    worlds = {info.world, host.world} - {""}  # of an older campaign it was not kept
+    if info.hardware == host.hardware == TWIN and len(worlds) > 1:
+        raise CampaignError(
+            f"{folder} holds a campaign in the {info.world} world of the twin, and this one is "
+            f"{host.world}. Resume with --world {info.world}, or name another folder"
+        )
 
 
-def recorded_seed(folder: Path) -> int | None:
-    """Return the seed of the campaign that a folder holds; None: it holds none.
+def recorded(folder: Path) -> CampaignInfo | None:
+    """Return what is kept of the campaign that a folder holds; None: it holds none.
 
     Raises
     ------
     CampaignError
         The campaign cannot be read.
     """
-    return CampaignReader(folder).info().seed if (folder / DATABASE).exists() else None
+    return CampaignReader(folder).info() if (folder / DATABASE).exists() else None
 
 
 def _info(recipe: Recipe, host: CampaignHost) -> CampaignInfo:
@@ -170,4 +179,5 @@ def _info(recipe: Recipe, host: CampaignHost) -> CampaignInfo:
         seed=host.seed,
         rate=host.rate,
         versions=host.versions,
+        world=host.world,
     )

@@ -211,6 +211,8 @@ class CampaignInfo:
         Of CoSMic and the packages it stands on.
     hardware : str
         "digital twin" or the platform's name.
+    world : str
+        The twin's; empty on hardware, and in campaigns from before it was kept.
     """
 
     name: str
@@ -224,6 +226,7 @@ class CampaignInfo:
     seed: int = 0
     rate: float = 1.0
     versions: Mapping[str, str] = field(default_factory=dict)
+    world: str = ""
 
 
 @dataclass(frozen=True, slots=True)

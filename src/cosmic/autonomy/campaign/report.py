@@ -256,6 +256,8 @@ def _summary(data: ReportData) -> list[tuple[str, str]]:
     ]
     if info.hardware == TWIN:
         rows.insert(3, ("Seed and rate of the twin", f"{info.seed}; {info.rate:g} times"))
+        if info.world:
+            rows.insert(4, ("World of the twin", info.world))
     return rows
 
 

@@ -40,6 +40,7 @@ CREATE TABLE campaign (
     recipe_text TEXT NOT NULL, recipe_sha256 TEXT NOT NULL, started TEXT NOT NULL,
     description TEXT NOT NULL, operator TEXT NOT NULL, hardware TEXT NOT NULL,
     seed INTEGER NOT NULL, rate REAL NOT NULL, versions_json TEXT NOT NULL,
+    world TEXT NOT NULL DEFAULT '',
     ended TEXT NOT NULL DEFAULT '', end_reason TEXT NOT NULL DEFAULT ''
 );
 CREATE TABLE run (
@@ -94,11 +95,12 @@ CREATE TABLE journal (
 
 
 ADDED: Final = {
+    "campaign": {"world": "TEXT NOT NULL DEFAULT ''"},
     "fibre": {
         "budget_json": "TEXT NOT NULL DEFAULT '[]'",
         "scale_verified": "INTEGER NOT NULL DEFAULT 0",
         "notes": "TEXT NOT NULL DEFAULT ''",
-    }
+    },
 }
 """Columns that a campaign begun with an earlier program does not have."""
 

@@ -211,6 +211,7 @@ def _lay_out(file: Path, info: CampaignInfo) -> None:
         "hardware": info.hardware,
         "seed": info.seed,
         "rate": info.rate,
+        "world": info.world,
         "versions_json": json.dumps(dict(info.versions)),
     }
     connection = sqlite3.connect(part, isolation_level=None)

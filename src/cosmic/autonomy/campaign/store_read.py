@@ -81,6 +81,7 @@ class CampaignReader:
             seed=int(number(row["seed"])),
             rate=number(row["rate"]),
             versions=json.loads(str(row["versions_json"])),
+            world=str(row.get("world", "")),
         )
 
     def ended(self) -> tuple[str, str]:
