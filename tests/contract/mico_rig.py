@@ -13,7 +13,7 @@ from cosmic.frame.network.line_settings import Line
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Transport
 from cosmic.mico.api.application import MicoApplication
-from cosmic.mico.api.elsewhere import MicoElsewhere
+from cosmic.mico.api.client import MicoClient
 from cosmic.mico.api.mico import Mico, mico_of
 
 
@@ -81,12 +81,12 @@ def transport_to(hosted: HostedMico, how: str, name: str = "vision") -> Iterator
 @contextmanager
 def remote_mico(
     hosted: HostedMico, how: str, name: str = "vision", *, takes_lease: bool = True
-) -> Iterator[tuple[Mico, MicoElsewhere, Transport]]:
+) -> Iterator[tuple[Mico, MicoClient, Transport]]:
     """MiCo of the station as a program elsewhere has it."""
     with transport_to(hosted, how, name) as transport:
         if takes_lease:
             transport.take_lease()
-        application = MicoElsewhere(transport, FailurePolicy())
+        application = MicoClient(transport, FailurePolicy())
         try:
             application.initialize()
             assert not application.failure, application.failure

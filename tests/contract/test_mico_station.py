@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 
@@ -40,7 +41,7 @@ from cosmic.frame.operation import Progress
 from cosmic.frame.threads import declare_gui_thread
 from cosmic.frame.verdict import Reason
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.api.elsewhere import MicoElsewhere
+from cosmic.mico.api.client import MicoClient
 from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.api.trajectory_places import AwayFromStartError
@@ -48,6 +49,9 @@ from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
 from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.motion.orders import Jog, MoveTo, Steer
 from cosmic.mico.core.motion.positioner import Confidence, Status
+from cosmic.mico.core.motion.stop_latch import StopState
+from cosmic.mico.core.teleoperation.state import TeleoperationPhase
+from unit.mico.hand_input import HandInput
 
 SLOW_HZ = 10
 HEAD = "cosmic-trajectory 1\nplatform FiberStation\n"
@@ -199,29 +203,89 @@ def test_a_jog_that_nobody_renews_ends_by_itself(mico: Mico) -> None:
 
 def test_a_steered_axis_follows_the_input_and_ends_without_it(mico: Mico) -> None:
     axis = mico["left.x"]
-    order = axis.commander.steer(0, 5.0, dead_man_s=0.5)
+    hand = axis.steer(5.0, dead_man_s=0.5)
     until_s = WALL.now_s() + 0.7
     while WALL.now_s() < until_s:
-        axis.commander.steer_on(order, 5.0)
+        hand.renew(5.0)
         WALL.sleep(0.01)
-    assert not order.movement.done
-    order.movement.exception(3.0)  # the hand is away
+    assert not hand.done
+    hand.movement.exception(3.0)  # nobody renews it any more
     assert 5.0 < (axis.position_um or 0.0) < 1_000.0
 
 
+def steered_for(hand: HandInput, axis: Axis, push: float) -> None:
+    """Push until the axis has gone some way in that direction, and let go."""
+    before = axis.position_um or 0.0
+    hand.axes["left_x"] = push
+    wait_for(lambda: push * ((axis.position_um or 0.0) - before) > 5.0)
+    hand.axes["left_x"] = 0.0
+    wait_for(lambda: not axis.details.in_motion, 3.0)
+
+
+def test_an_input_device_steers_the_axes_wherever_they_are(mico: Mico) -> None:
+    hand, axis, steering = HandInput(quiet_s=None), mico["left.x"], mico.teleoperation
+    hand.axes = {"left_x": 0.0, "left_y": 0.0, "right_y": 0.0}
+    steering.start(hand, "left assembly")
+    try:
+        wait_for(lambda: steering.state.phase is TeleoperationPhase.ARMED)
+        for push in (1.0, -1.0):
+            steered_for(hand, axis, push)
+        hand.axes["left_x"] = 1.0
+        wait_for(lambda: axis.details.in_motion)
+        hand.go_on.clear()  # it hangs: the dead man notices, at the station too
+        wait_for(lambda: not axis.details.in_motion, 3.0)
+        hand.axes["left_x"] = 0.0
+        hand.go_on.set()
+        mico.stop("seen")
+        wait_for(lambda: steering.state.phase is TeleoperationPhase.STOPPED)
+        assert "seen" in steering.state.reason
+    finally:
+        hand.go_on.set()
+        steering.stop()
+
+
+def test_the_signals_of_a_commander_report_what_became_of_movements(mico: Mico) -> None:
+    axis = mico["left.x"]
+    ended: list[object] = []
+    refused: list[object] = []
+    states: list[object] = []
+    direct = Qt.ConnectionType.DirectConnection
+    axis.commander.movement_ended.connect(ended.append, direct)
+    axis.commander.movement_refused.connect(refused.append, direct)
+    axis.commander.state_changed.connect(states.append, direct)
+    axis.move_to(12.0)
+    with pytest.raises(LimitError):
+        axis.move_to(9_000.0)
+    wait_for(lambda: ended and refused and states)
+    assert [str(getattr(each, "reason", "")) for each in refused] == [str(Reason.LIMIT)]
+
+
+def test_who_follows_the_stop_hears_of_each(mico: Mico) -> None:
+    heard: list[StopState] = []
+    end = mico.follow_stop(heard.append)
+    mico.stop("one")
+    wait_for(lambda: heard)
+    mico.reset_stop()
+    wait_for(lambda: not heard[-1].latched)
+    end()
+    mico.stop("two")
+    mico.reset_stop()
+    assert [each.reason and "one" in each.reason for each in heard] == [True, None]
+
+
 def test_a_stop_stays_until_it_is_reset(mico: Mico) -> None:
-    axis, manager = mico["left.x"], mico.application.manager
+    axis = mico["left.x"]
     axis.set_closed_loop_frequency(SLOW_HZ)
     movement = axis.move_to(5_000.0, wait=False)
     wait_for(lambda: axis.details.in_motion)
-    manager.stop("stop from a script")
-    assert "stop from a script" in (manager.latch.state.reason or "")
+    mico.stop("stop from a script")
+    assert "stop from a script" in (mico.stop_state.reason or "")
     with pytest.raises(StoppedError):
         movement.wait(5.0)
     with pytest.raises(StoppedError):
         axis.move_to(0.0)
-    manager.reset_stop()
-    assert not manager.latch.state.latched
+    mico.reset_stop()
+    assert not mico.stop_state.latched
     axis.set_closed_loop_frequency(5000)
     axis.move_to(0.0)
 
@@ -313,7 +377,7 @@ def test_a_trajectory_is_stepped_watched_and_goes_on_where_it_failed(mico: Mico)
         player.resume()
     assert away.value.targets["left.x"] == pytest.approx(30.0, abs=1.0)
     player.speed, player.loops = 10.0, 1
-    mico.application.manager.stop("test")
+    mico.stop("test")
     with pytest.raises(StoppedError):
         player.resume("straight")
         player.wait(10.0)
@@ -385,7 +449,7 @@ def test_a_new_command_of_mico_is_called_by_script_window_and_station(
         stack.callback(host.close)
         station.host("mico", host)
         client = stack.enter_context(connected_in_memory(station))
-        application = MicoElsewhere(client, FailurePolicy(), kind=MicoWithBell)
+        application = MicoClient(client, FailurePolicy(), kind=MicoWithBell)
         stack.callback(application.shut_down)
         application.initialize()
         mico = mico_of(application, "window")
@@ -409,7 +473,7 @@ def test_a_new_command_of_mico_is_called_by_script_window_and_station(
 
 
 def test_without_the_lease_nothing_moves_remotely(hosted: HostedMico, how: str) -> None:
-    with remote_mico(hosted, how, takes_lease=False) as (mico, application, _):
+    with remote_mico(hosted, how, takes_lease=False) as (mico, _, _):
         for move in (
             lambda: mico["left.x"].move_to(50.0),
             lambda: mico.move({"left.x": 50.0}),
@@ -420,7 +484,7 @@ def test_without_the_lease_nothing_moves_remotely(hosted: HostedMico, how: str) 
             lambda: mico.link("left.x", "right.x"),
             lambda: mico.collision.take_out("left.x"),
             lambda: mico.poses.go("there"),
-            application.manager.reset_stop,
+            mico.reset_stop,
         ):
             with pytest.raises((MoveRefused, NotAvailable)) as caught:
                 move()
@@ -539,7 +603,7 @@ def test_going_to_a_pose_ends_with_the_program_that_began_it(hosted: HostedMico,
 def test_what_a_program_has_begun_stops_when_it_closes_mico(hosted: HostedMico, how: str) -> None:
     with transport_to(hosted, how) as client:
         client.take_lease()
-        application = MicoElsewhere(client, FailurePolicy())
+        application = MicoClient(client, FailurePolicy())
         application.initialize()
         axis = mico_of(application)["left.x"]
         axis.set_closed_loop_frequency(SLOW_HZ)
@@ -557,7 +621,7 @@ def test_a_mistake_in_the_program_that_moves_stops_the_station(hosted: HostedMic
     policy = FailurePolicy()
     with transport_to(hosted, "memory") as client:
         client.take_lease()
-        application = MicoElsewhere(client, policy)
+        application = MicoClient(client, policy)
         try:
             application.initialize()
             policy.report(ValueError("nothing moves"), "here")
@@ -599,20 +663,20 @@ def test_a_stop_and_a_halt_need_no_lease(hosted: HostedMico, how: str) -> None:
             movement.wait(5.0)
         movement = holder["left.x"].move_to(5_000.0, wait=False)
         wait_for(lambda: hosted.mico["left.x"].details.in_motion)
-        viewer.manager.stop("smoke")
+        viewer.api.stop("smoke")
         with pytest.raises(StoppedError, match="smoke"):
             movement.wait(5.0)
         assert hosted.application.manager.latch.state.reason == "smoke (from viewer)"
         with pytest.raises(MoveRefused):
-            viewer.manager.reset_stop()
-        holder.application.manager.reset_stop()
+            viewer.api.reset_stop()
+        holder.reset_stop()
         with pytest.raises(CallRefused):
             transport.call("mico", "manager")
 
 
 def test_somebody_who_may_only_look_sees_and_stops_and_moves_nothing(hosted: HostedMico) -> None:
     with connected_in_memory(hosted.station, "viewer", Access.VIEW) as viewer:
-        application = MicoElsewhere(viewer, FailurePolicy())
+        application = MicoClient(viewer, FailurePolicy())
         try:
             application.initialize()
             mico = mico_of(application)
@@ -671,7 +735,7 @@ def test_an_ill_typed_order_moves_nothing(hosted: HostedMico, how: str) -> None:
             ("poses.learn", {"name": "a\nb"}),
             ("poses.begin", {"name": "nowhere"}),
             ("trajectories.begin_player", {"given": "never given"}),
-            ("trajectories.players.begin", {"@": ("7",)}),
+            ("trajectories.players.begin", {"@": ("none",)}),
             ("begin_search", {"targets": {"left.x": 1.0}, "budget_s": 1e9}),
             ("axes.limit_frequency", {"frequency_hz": 0} | left),
             ("axes.halt", {"@": ("nowhere",)}),
@@ -706,7 +770,7 @@ def test_what_a_call_has_changed_is_known_when_it_returns(hosted: HostedMico) ->
     with ExitStack() as stack:
         client = stack.enter_context(connected_in_memory(hosted.station, kind=Deaf))
         client.take_lease()
-        application = MicoElsewhere(client, FailurePolicy())
+        application = MicoClient(client, FailurePolicy())
         stack.callback(application.shut_down)
         application.initialize()
         mico = mico_of(application)
@@ -719,10 +783,10 @@ def test_what_a_call_has_changed_is_known_when_it_returns(hosted: HostedMico) ->
         assert axis.position_um == pytest.approx(0.0, abs=1.0)
         axis.clear_zero()
         assert mico.undo_entries
-        application.manager.stop("x")
-        assert application.manager.latch.state.latched
-        application.manager.reset_stop()
-        assert not application.manager.latch.state.latched
+        mico.stop("x")
+        assert mico.stop_state.latched
+        mico.reset_stop()
+        assert not mico.stop_state.latched
 
 
 def test_an_older_word_changes_nothing(hosted: HostedMico) -> None:
@@ -760,7 +824,7 @@ def test_who_commands_is_reported_and_positions_are_reported_seldom(
 
 
 def test_what_is_done_at_the_station_is_seen_remotely(hosted: HostedMico, how: str) -> None:
-    with remote_mico(hosted, how, takes_lease=False) as (mico, application, _):
+    with remote_mico(hosted, how, takes_lease=False) as (mico, _, _):
         hosted.mico["left.x"].move_to(70.0)
         wait_for(lambda: abs((mico["left.x"].position_um or 0.0) - 70.0) < 1.0)
         hosted.mico.link("left.x", "right.x")
@@ -770,14 +834,14 @@ def test_what_is_done_at_the_station_is_seen_remotely(hosted: HostedMico, how: s
         with pytest.raises(MoveRefused):
             hosted.mico["left.y"].move_to(99_000.0)
         hosted.application.manager.stop("smoke")
-        wait_for(lambda: application.manager.latch.state.reason == "smoke")
+        wait_for(lambda: mico.stop_state.reason == "smoke")
         with ThreadPoolExecutor(1) as pool:
             assert pool.submit(lambda: mico["left.x"].details).result(5.0).present
 
 
 def test_a_station_that_is_away_leaves_axes_absent_and_moves_refused(hosted: HostedMico) -> None:
     with transport_to(hosted, "memory") as transport:
-        application = MicoElsewhere(transport, FailurePolicy())
+        application = MicoClient(transport, FailurePolicy())
         try:
             application.initialize()
             mico = mico_of(application)
@@ -790,7 +854,7 @@ def test_a_station_that_is_away_leaves_axes_absent_and_moves_refused(hosted: Hos
             with pytest.raises(StationAway):
                 mico.move({"left.x": 10.0})
             with pytest.raises(StationAway):
-                application.manager.stop("x")
+                mico.stop("x")
             assert mico.check({"left.x": 10.0}).reason is Reason.NO_ANSWER
         finally:
             application.shut_down()

@@ -54,12 +54,7 @@ KEPT = {
     "mico/api/mico.py": {"judge"},  # `Mico.judge` is part of the scripted API
     "autonomy/control/sink.py": {"judge"},
     "mico/api/tools.py": {"judge"},
-    "mico/api/axis.py": {"elsewhere"},
-    "app/stations/remote_applications.py": {"elsewhere"},
 }
-LEFT = ("mico/api/elsewhere.py", "mico/api/manager_elsewhere.py", "mico/api/mirrors.py")
-LEFT += ("mico/core/state_news.py",)
-"""What another station's MiCo was made of before it was declared."""
 _ANY = re.compile("|".join([*INSTEAD, *PHRASES]), re.IGNORECASE)
 _PARTS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
@@ -104,8 +99,6 @@ def test_names_and_texts_use_the_words_of_the_field() -> None:
     found = []
     for path in sorted(SOURCES.rglob("*.py")):
         file = path.relative_to(SOURCES).as_posix()
-        if file in LEFT:
-            continue
         source = path.read_text(encoding="utf-8")
         found += [f"{file}:{each}" for each in private_words(source, KEPT.get(file, set()))]
     assert found == []
@@ -113,7 +106,7 @@ def test_names_and_texts_use_the_words_of_the_field() -> None:
 
 def test_files_and_tests_are_named_in_the_words_of_the_field() -> None:
     paths = [path for folder in (SOURCES, TESTS) for path in sorted(folder.rglob("*.py"))]
-    names = [path.stem for path in paths if not path.as_posix().endswith(LEFT)]
+    names = [path.stem for path in paths]
     for path in sorted(TESTS.rglob("test_*.py")):
         names += re.findall(r"def (test_\w+)", path.read_text(encoding="utf-8"))
     assert [name for name in names if parts(name) & INSTEAD.keys()] == []

@@ -8,7 +8,7 @@ from contract.station_rig import connected
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
-from cosmic.mico.api.elsewhere import MicoElsewhere
+from cosmic.mico.api.client import MicoClient
 from cosmic.mico.api.mico import mico_of
 from cosmic.mico.core.motion.movement import Movement
 
@@ -21,7 +21,7 @@ def say(text: str) -> None:
 def main(what: str, endpoint: str) -> None:
     with connected(endpoint, "vision") as client:
         client.take_lease()
-        application = MicoElsewhere(client, FailurePolicy())
+        application = MicoClient(client, FailurePolicy())
         application.initialize()
         axis = mico_of(application)["left.x"]
         ended, movement = threading.Event(), Movement()

@@ -11,7 +11,7 @@ from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.garbage import GARBAGE
 from cosmic.frame.threads import WorkerThread, running_threads
-from cosmic.mico.api.application_base import MicoApplicationBase
+from cosmic.mico.api.mico import Mico
 
 PERIOD_S: Final = 0.5
 YOUNG_PERIOD_S: Final = 0.1
@@ -34,7 +34,7 @@ class GarbageWatch:
 
     Parameters
     ----------
-    mico : MicoApplicationBase or None
+    mico : Mico or None
         What moves.
     daqco : DaqcoApplication or None
         What guards movements elsewhere, where there is no `mico`.
@@ -42,7 +42,7 @@ class GarbageWatch:
 
     def __init__(
         self,
-        mico: MicoApplicationBase | None,
+        mico: Mico | None,
         daqco: DaqcoApplication | None,
         policy: FailurePolicy,
     ) -> None:
@@ -85,7 +85,7 @@ class GarbageWatch:
         if any(isinstance(each, ControlLoop) for each in running_threads()):
             return True
         if self._mico is not None:
-            return any(state.in_motion for state in self._mico.manager.states().values())
+            return any(state.in_motion for state in self._mico.states().values())
         return self._daqco is not None and self._daqco.guard.armed
 
     def end(self) -> None:

@@ -29,6 +29,7 @@ from cosmic.frame.platform_services import tick_finely
 from cosmic.frame.plugins import Kind, is_simulated, missing_packages
 from cosmic.frame.threads import share_interpreter
 from cosmic.mico.api.application_base import MicoApplicationBase
+from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.vico import Vico
@@ -110,7 +111,8 @@ class Platform:
     def garbage(self) -> GarbageWatch:
         """Keeps garbage collection from what moves, while the platform is open."""
         own = self.daqco if isinstance(self.daqco, DaqcoApplication) else None
-        return GarbageWatch(self.mico, own, self.policy)
+        mico = None if self.mico is None else mico_of(self.mico)
+        return GarbageWatch(mico, own, self.policy)
 
     def initialize(self) -> None:
         """Open the hardware of every application that runs here."""
@@ -295,7 +297,7 @@ def _connect(
     )
 
 
-def stopped_since(mico: MicoApplicationBase | None) -> Callable[[], str | None]:
+def stopped_since(mico: Mico | None) -> Callable[[], str | None]:
     """Return what gives the reason of a stop that is latched or was since the first call, or None.
 
     A reset allows motion again, but what was stopped before it does not go on by itself.
@@ -306,7 +308,7 @@ def stopped_since(mico: MicoApplicationBase | None) -> Callable[[], str | None]:
         nonlocal epoch
         if mico is None:
             return None
-        state = mico.manager.latch.state
+        state = mico.stop_state
         if epoch is None:
             epoch = state.epoch
         if state.reason is not None:

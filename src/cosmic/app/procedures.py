@@ -33,7 +33,7 @@ def campaign_on(
     host = CampaignHost(
         rig=rig,
         policy=platform.policy,
-        stopped=stopped_since(platform.mico),
+        stopped=stopped_since(None if platform.mico is None else rig.mico),
         hardware=TWIN if platform.simulated else platform.file.platform.name,
         rate=platform.clock.rate,
         seed=platform.seed if platform.simulated else 0,

@@ -208,7 +208,7 @@ class Rig:
             work,
             self._platform.clock,
             self._platform.policy,
-            stopped=stopped_since(self._platform.mico),
+            stopped=stopped_since(self._mico),
         )
         self._runs.add(cast("ProcedureRun[object]", run))
         return run
@@ -274,8 +274,8 @@ class Rig:
             there stops by itself.
         """
         try:
-            if self._platform.mico is not None:
-                self._platform.mico.manager.stop(reason)
+            if self._mico is not None:
+                self._mico.stop(reason)
         finally:
             if self._has_outputs:
                 self.daqco.stop_outputs(reason)

@@ -18,7 +18,7 @@ from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import NotAvailable
-from cosmic.mico.api.application_base import MicoApplicationBase
+from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.teleoperation.coupling import ForceCoupling
 from cosmic.mico.core.teleoperation.mapping import Converter
 from cosmic.mico.core.teleoperation.settings import TeleoperationSettings
@@ -173,7 +173,7 @@ class TestAppMiCoConverter(Converter):
         return self._force.slow_down(self._mapping.convert(inputs, fine=fine))
 
 
-def join_teleoperation(mico: MicoApplicationBase, daqco: DaqcoApplication) -> TestAppDAQCoConverter:
+def join_teleoperation(mico: Mico, daqco: DaqcoApplication) -> TestAppDAQCoConverter:
     """Have the hand that steers feel the force, and be slowed down by it.
 
     Chunks are taken while something is steered; returns what takes them.

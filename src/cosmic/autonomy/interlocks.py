@@ -12,7 +12,8 @@ from cosmic.daqco.api.recorder import Recorder
 from cosmic.daqco.core.chunk import DataChunk, Values
 from cosmic.daqco.core.recording_format import AxisPosition
 from cosmic.frame.clock import WALL, Clock
-from cosmic.mico.api.application_base import MicoApplicationBase
+from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.vico.api.application import VicoApplication
 
@@ -24,7 +25,7 @@ TOUCH_AGAIN_S: Final = 0.1
 """How often a touch that lasts is told, for movements that begin in it."""
 
 
-def join_force_limits(daqco: DaqcoApplication, mico: MicoApplicationBase) -> None:
+def join_force_limits(daqco: DaqcoApplication, mico: MicoApplication) -> None:
     """Have a limit of DAQCo that is crossed stop every actuator of MiCo, and keep it stopped.
 
     The stop is called in the acquisition thread, past every queue. Where MiCo is not hosted in
@@ -33,12 +34,11 @@ def join_force_limits(daqco: DaqcoApplication, mico: MicoApplicationBase) -> Non
     daqco.guard.trip = mico.manager.stop
 
 
-def join_outputs(daqco: DaqcoApplication, mico: MicoApplicationBase) -> None:
+def join_outputs(daqco: DaqcoApplication, mico: Mico) -> None:
     """Have a stop of MiCo stop the outputs of DAQCo as well, until that stop is reset.
 
     The boards are written to by a thread of their own, after every channel of MiCo was stopped.
     """
-    latch = mico.manager.latch
 
     def follow(state: StopState) -> None:
         if state.reason is not None:
@@ -46,11 +46,11 @@ def join_outputs(daqco: DaqcoApplication, mico: MicoApplicationBase) -> None:
         else:
             daqco.outputs.reset()
 
-    latch.subscribe(follow)
-    daqco.stopped_outside = lambda: latch.state.reason or ""
+    mico.follow_stop(follow)
+    daqco.stopped_outside = lambda: mico.stop_state.reason or ""
 
 
-def join_force_cautions(daqco: DaqcoApplication, mico: MicoApplicationBase) -> None:
+def join_force_cautions(daqco: DaqcoApplication, mico: MicoApplication) -> None:
     """Have undo and initialisation ask where a force is felt beyond ``[mico.undo] felt_un``.
 
     A touch that is over when a movement ends is told to undo as well. Only channels whose unit is
@@ -68,7 +68,7 @@ def join_force_cautions(daqco: DaqcoApplication, mico: MicoApplicationBase) -> N
 class TouchWatch:
     """Tells the cautions of MiCo of touches that last `TOUCH_S`; acquisition thread."""
 
-    def __init__(self, mico: MicoApplicationBase) -> None:
+    def __init__(self, mico: MicoApplication) -> None:
         self._mico = mico
         self._published_s: dict[str, float] = {}
         self._recent: deque[tuple[Values, int]] = deque()
@@ -133,7 +133,7 @@ def join_exposures(vico: VicoApplication, daqco: DaqcoApplication) -> None:
     vico.sample_source = sample
 
 
-def join_positions(recorder: Recorder, mico: MicoApplicationBase, clock: Clock) -> None:
+def join_positions(recorder: Recorder, mico: Mico, clock: Clock) -> None:
     """Have the positions of all axes written into every recording, on its clock.
 
     Positions are gate coordinates, at the moment they were read.
@@ -142,7 +142,7 @@ def join_positions(recorder: Recorder, mico: MicoApplicationBase, clock: Clock) 
     def positions() -> Iterator[AxisPosition]:
         now_s, now_wall_s = clock.now_s(), WALL.now_s()
         rate = clock.rate or 1.0
-        for state in mico.manager.states().values():
+        for state in mico.states().values():
             age_s = max(0.0, now_wall_s - state.read_wall_s) * rate if state.in_motion else 0.0
             yield AxisPosition(
                 time_s=now_s - age_s,
@@ -155,17 +155,17 @@ def join_positions(recorder: Recorder, mico: MicoApplicationBase, clock: Clock) 
     recorder.position_source = positions
 
 
-def join_stage_positions(vico: VicoApplication, mico: MicoApplicationBase) -> None:
+def join_stage_positions(vico: VicoApplication, mico: Mico) -> None:
     """Have the positions of all axes stand beside every image; gate coordinates."""
 
     def positions(_time_s: float) -> dict[str, float]:
         return {
             state.name: state.position
-            for state in mico.manager.states().values()
+            for state in mico.states().values()
             if state.position is not None
         }
 
-    axes = {each.name: each.unit for each in mico.manager.settings.positioner}
+    axes = {each.name: each.unit for each in mico.settings.positioner}
     for unit in vico.units.values():
         unit.recordings.axes = axes
     vico.position_source = positions

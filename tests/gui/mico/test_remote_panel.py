@@ -17,7 +17,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.theme import State
 from cosmic.frame.network.client_side_connection import ClientSideConnection
 from cosmic.frame.threads import declare_gui_thread
-from cosmic.mico.api.elsewhere import MicoElsewhere
+from cosmic.mico.api.client import MicoClient
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.api.trajectory_state import PlayState
 from cosmic.mico.gui.mico_widget import MicoWidget, make_mico_gui
@@ -43,7 +43,7 @@ def remote_panel(
     with ExitStack() as stack:
         client = stack.enter_context(connected(hosted.endpoint))
         client.take_lease()
-        application = MicoElsewhere(client, FailurePolicy(), gui_factory=make_mico_gui)
+        application = MicoClient(client, FailurePolicy(), gui_factory=make_mico_gui)
         stack.callback(application.shut_down)
         stack.callback(declare_gui_thread())
         application.initialize()
@@ -109,7 +109,7 @@ def test_the_panel_of_another_station_moves_jogs_steps_undoes_and_stops(qtbot: Q
         panel.mico["left.x"].move_to(240.0, wait=False)
         wait_for_position(qtbot, panel.cards["left.x"], 240.0)
 
-        panel.mico.application.manager.stop("the button")
+        panel.mico.stop("the button")
         qtbot.waitUntil(lambda: hosted.application.manager.latch.state.latched, timeout=LONG_MS)
 
 

@@ -158,7 +158,7 @@ def test_the_number_keys_of_the_window_steer_as_long_as_they_are_held(qtbot, pan
 
 def test_what_cannot_be_started_says_why(qtbot, panel):
     choose(panel, HAPTIC, "stylus")
-    teleoperation(panel)._manager.stop("test")
+    teleoperation(panel)._platform.stop("test")
     press_start(qtbot, panel)
     assert "reset the stop first" in panel.message.text()
     assert panel.indicator.words == "off"

@@ -1,12 +1,11 @@
 """What was stopped does not go on by itself, however soon the stop was reset."""
 
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import pytest
 
 from cosmic.app.platform import RESET_SINCE, stopped_since
-from cosmic.mico.core.motion.stop_latch import StopLatch
+from cosmic.mico.core.motion.stop_latch import StopLatch, StopState
 
 
 @pytest.fixture
@@ -15,7 +14,12 @@ def latch() -> StopLatch:
 
 
 def mico(latch: StopLatch) -> Any:
-    return cast("Any", SimpleNamespace(manager=SimpleNamespace(latch=latch)))
+    class Axes:
+        @property
+        def stop_state(self) -> StopState:
+            return latch.state
+
+    return Axes()
 
 
 def test_a_stop_is_reported_with_its_reason_and_after_its_reset_too(latch: StopLatch) -> None:

@@ -94,8 +94,7 @@ class ScenePanel(QWidget):
         self._settings = settings
         self._scene: SceneWidget | None = None
         self._asked = False
-        model = self._mico.application.collision
-        self._model: SceneModel | None = model.model if model is not None else None
+        self._model: SceneModel | None = self._mico.application.scene
         self._positions: dict[str, float] = {}
         self._unknown: dict[str, bool] = {}
         self._verdict: MoveVerdict | None = None

@@ -23,6 +23,7 @@ from cosmic.frame.errors import ConfigError, NotAvailable, PluginError
 from cosmic.frame.plugins import Kind, NoOptions, make
 from cosmic.frame.version import __version__
 from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.mico import mico_of
 from cosmic.mico.core.settings import ControllerSettings, MicoSettings
 from cosmic.mico.hw.factory import join, make_controller
 from cosmic.mico.hw.interface import Controller
@@ -128,7 +129,7 @@ def _build_mico(_options: NoOptions, context: ApplicationContext) -> CosmicAppli
     controllers = [_make_controller(site, each) for each in settings.controllers]
     for each in reversed(controllers):  # the first has the last word
         faults.join_simulated("controller", each)
-    return MicoApplication(
+    application = MicoApplication(
         join(controllers),
         settings,
         clock=site.clock,
@@ -138,6 +139,9 @@ def _build_mico(_options: NoOptions, context: ApplicationContext) -> CosmicAppli
         folder=site.path.parent,
         gui_factory=context.gui_factory,
     )
+    # Made now, so that a profile that is wrong is told at the start.
+    application.teleoperation_of(mico_of(application, "teleoperation"))
+    return application
 
 
 def _make_controller(site: Site, settings: MicoSettings | ControllerSettings) -> Controller:

@@ -1,6 +1,7 @@
 """Joins what one application does to another, in this process or over a line."""
 
 from pathlib import Path
+from typing import Final
 
 from cosmic.app.applications import Site
 from cosmic.app.stations.hosting import Hosted
@@ -22,19 +23,24 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.application import RemoteApplication
 from cosmic.frame.version import __version__
 from cosmic.mico.api.application_base import MicoApplicationBase
+from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.vico.api.application import VicoApplication
+
+SOURCE: Final = "interlock"
+"""Who stops, for the log."""
 
 
 def join_here(own: Hosted, site: Site) -> None:
     """Join the applications of this process to each other."""
     mico, daqco, vico = own.mico, own.daqco, own.vico
     if daqco is not None and mico is not None:
+        api = mico_of(mico, SOURCE)
         join_force_limits(daqco, mico)
-        join_outputs(daqco, mico)
+        join_outputs(daqco, api)
         join_force_cautions(daqco, mico)
-        join_teleoperation(mico, daqco)
-        join_positions(daqco.recorder, mico, site.clock)
+        join_teleoperation(api, daqco)
+        join_positions(daqco.recorder, api, site.clock)
     if vico is not None and mico is not None:
         join_vision(vico, mico, site.path)
     if vico is not None and daqco is not None:
@@ -49,7 +55,7 @@ def join_vision(vico: VicoApplication, mico: MicoApplicationBase, path: Path) ->
     path : Path
         The platform file, beside which calibrations are kept.
     """
-    join_stage_positions(vico, mico)
+    join_stage_positions(vico, mico_of(mico, SOURCE))
     kept_in = vico.settings.calibration
     folder = path.parent / kept_in if kept_in else None
     join_transform(vico, mico, folder, __version__)
@@ -69,19 +75,20 @@ def join_stations(
     there, boards_at = remote.host_of.get("mico"), remote.host_of.get("daqco")
     if mico is None or daqco is None or there is boards_at:
         return
+    api = mico_of(mico, SOURCE)
     if isinstance(daqco, DaqcoApplication):
-        join_outputs(daqco, mico)
+        join_outputs(daqco, api)
     elif boards_at is not None:
-        _stop_outputs_there(mico, daqco_of(daqco), boards_at, policy)
+        _stop_outputs_there(api, daqco_of(daqco), boards_at, policy)
     guard = daqco_of(daqco).guard
     if there is None:
-        guard.trip = mico.manager.stop
+        guard.trip = api.stop
         return
 
     def trip(reason: str) -> None:
         # Aside, for the thread that acquires must not wait for a line.
         there.later(
-            lambda: mico.manager.stop(reason),
+            lambda: api.stop(reason),
             lambda exc: policy.report(exc, f"stop at {there.name} ({reason})"),
         )
 
@@ -89,7 +96,7 @@ def join_stations(
 
 
 def _stop_outputs_there(
-    mico: MicoApplicationBase, daqco: Daqco, station: RemoteStation, policy: FailurePolicy
+    mico: Mico, daqco: Daqco, station: RemoteStation, policy: FailurePolicy
 ) -> None:
     """Have a stop of MiCo stop outputs at another station; a reset there is given there."""
 
@@ -101,4 +108,4 @@ def _stop_outputs_there(
                 lambda exc: policy.report(exc, f"stop of outputs at {station.name} ({reason})"),
             )
 
-    mico.manager.latch.subscribe(follow)
+    mico.follow_stop(follow)

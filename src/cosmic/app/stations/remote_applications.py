@@ -15,7 +15,7 @@ from cosmic.frame.declaration import Declared
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.application import RemoteApplication
-from cosmic.mico.api.elsewhere import MicoElsewhere
+from cosmic.mico.api.client import MicoClient
 from cosmic.vico.api.vico import Vico
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class RemoteApplications:
             return RemoteApplication(
                 title, kind, station.transport, policy, name=name, gui_factory=gui
             )
-        return MicoElsewhere(station.transport, policy, gui_factory=gui)
+        return MicoClient(station.transport, policy, gui_factory=gui)
 
     def close(self) -> None:
         """End every line; any state."""

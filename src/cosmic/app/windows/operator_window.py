@@ -42,6 +42,7 @@ from cosmic.frame.gui.stop_key import StopKeyFilter
 from cosmic.frame.gui.theme import State
 from cosmic.frame.log import RingBufferHandler
 from cosmic.frame.overrides import override
+from cosmic.mico.api.mico import mico_of
 from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.mico.gui.mico_widget import MicoWidget
 
@@ -106,6 +107,7 @@ class OperatorWindow(CosmicServerGui):
         self._platform = platform
         self._host = host
         self._rig = Rig(platform, source="console")
+        self._mico = None if platform.mico is None else mico_of(platform.mico, "window")
         self._console: ConsolePanel | None = None
         self._procedures: ProcedurePanels | None = None
         self._mico_gui: MicoWidget | None = None
@@ -157,7 +159,7 @@ class OperatorWindow(CosmicServerGui):
         self.add_panel(MICO, panel, Qt.DockWidgetArea.LeftDockWidgetArea, scroll=False)
         self._mico_gui = gui
         gui.failure_changed.connect(self._on_mico_failure)
-        application.manager.latch.subscribe(self._bridge.report_latch)
+        gui.mico.follow_stop(self._bridge.report_latch)
         self._scene = ScenePanel(gui, settings)
         if not self._by_task:
             right = Qt.DockWidgetArea.RightDockWidgetArea
@@ -347,8 +349,8 @@ class OperatorWindow(CosmicServerGui):
 
     def stop(self, reason: str) -> None:
         """Stop everything and keep it stopped."""
-        if self._platform.mico is not None:
-            self._platform.mico.manager.stop(reason)  # which stops outputs as well
+        if self._mico is not None:
+            self._mico.stop(reason)  # which stops outputs as well
         elif self._platform.daqco is not None:
             daqco = daqco_of(self._platform.daqco)
             daqco.carry_out(lambda: daqco.stop_outputs(reason), self._on_outputs_stopped)
@@ -369,12 +371,12 @@ class OperatorWindow(CosmicServerGui):
     def _is_moving(self) -> bool:
         """Tell whether Escape has something to stop."""
         campaign = self._campaign is not None and self._campaign.running
-        mico = self._platform.mico
-        if campaign or mico is None or not mico.manager.ready:
+        mico = self._mico
+        if campaign or mico is None or not mico.ready:
             return campaign
-        task = mico.running_task
+        task = mico.application.running_task
         return (task is not None and not task.done) or any(
-            state.in_motion for state in mico.manager.states().values()
+            state.in_motion for state in mico.states().values()
         )
 
     def _cancel_tool(self) -> bool:
@@ -401,8 +403,8 @@ class OperatorWindow(CosmicServerGui):
         self.stop(f"key {key}")
 
     def _on_reset(self) -> None:
-        if self._platform.mico is not None:
-            self._platform.mico.manager.reset_stop()
+        if self._mico is not None:
+            self._mico.reset_stop()
 
     def _on_latch(self, state: StopState) -> None:
         self.top_bar.set_latched(state.reason)

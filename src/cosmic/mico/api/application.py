@@ -20,13 +20,13 @@ from cosmic.mico.api.ways import PlannedPath, follow, way_from_plan
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.collision_manager import CollisionManager
+from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.mode import Mode
 from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.undo import Cautions, ClosedGrippers, UndoHistory
 from cosmic.mico.core.path_planner import PathPlanner
 from cosmic.mico.core.sequence.report import SequenceReport
 from cosmic.mico.core.settings import MicoSettings
-from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 from cosmic.mico.hw.interface import Controller
 
 logger = logging.getLogger(__name__)
@@ -52,13 +52,13 @@ class MicoApplication(MicoApplicationBase):
         gui_factory: GuiFactory | None = None,
         parent: QObject | None = None,
     ) -> None:
-        super().__init__("MiCo", policy, gui_factory, parent)
+        super().__init__(policy, folder, gui_factory, parent)
         self.manager = DeviceManager(
             controller, settings, clock=clock, policy=policy, checker=checker
         )
         self.collision = checker if isinstance(checker, CollisionManager) else None
         self.clearance_watch = (
-            ClearanceWatch(self.collision, self.manager.positions, policy)
+            ClearanceWatch(self.collision.nearest, self.manager.positions, policy)
             if self.collision is not None
             else None
         )
@@ -69,7 +69,6 @@ class MicoApplication(MicoApplicationBase):
         self._grippers = ClosedGrippers(self.manager)
         self.cautions.add(self._grippers.doubt)
         self.undo = UndoHistory(self.manager, self.cautions)
-        self.teleoperation = Teleoperation(self.manager, policy, folder=folder)
         self.trajectories = TrajectorySite(self, policy, platform, folder)
         self.players = Players()
         self._failure = ""
@@ -82,6 +81,11 @@ class MicoApplication(MicoApplicationBase):
     def failure(self) -> str:
         """Why MiCo cannot work; empty when it can."""
         return self._failure
+
+    @property
+    @override
+    def scene(self) -> SceneModel | None:
+        return None if self.collision is None else self.collision.model
 
     @override
     def initialize(self) -> None:
@@ -241,7 +245,7 @@ class MicoApplication(MicoApplicationBase):
     def shut_down(self) -> None:
         """Stop every movement, release the hold, end all threads; any state."""
         self.request_end()
-        self.teleoperation.close()
+        self._end_teleoperation()
         self.recordings.close()
         if self.clearance_watch is not None:
             self.clearance_watch.request_end()

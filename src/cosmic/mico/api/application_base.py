@@ -2,6 +2,8 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping
+from pathlib import Path
+from threading import Lock
 from typing import Final
 
 from PySide6.QtCore import QObject, Signal
@@ -12,14 +14,13 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Task
 from cosmic.frame.task_application import TaskApplication
 from cosmic.mico.api.initialisation import Confirm
-from cosmic.mico.api.ports import CollisionPort
 from cosmic.mico.api.trajectory_recording import Recordings
 from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
+from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.motion.undo import Cautions
-from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.sequence.report import SequenceReport
-from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
+from cosmic.mico.core.teleoperation.teleoperation import SteeredPlatform, Teleoperation
 
 WAY_BUDGET_S: Final = 1.0
 """How long a way is looked for, in wall time."""
@@ -43,21 +44,48 @@ class MicoApplicationBase(TaskApplication):
     way_missing = Signal(object)
     initialisation_changed = Signal(object)
 
-    manager: ManagerPort
-    collision: CollisionPort | None
     clearance_watch: ClearanceWatch | None
     cautions: Cautions
-    teleoperation: Teleoperation
 
     def __init__(
         self,
-        title: str,
         policy: FailurePolicy,
+        folder: Path | None = None,
         gui_factory: GuiFactory | None = None,
         parent: QObject | None = None,
     ) -> None:
-        super().__init__(title, policy, gui_factory, parent)
+        super().__init__("MiCo", policy, gui_factory, parent)
         self.recordings = Recordings(policy)
+        self._folder = folder
+        self._steering = Lock()
+        self._teleoperation: Teleoperation | None = None
+
+    def teleoperation_of(self, platform: SteeredPlatform) -> Teleoperation:
+        """Return what steers the axes by an input device plugged in here; any thread.
+
+        There is one for the whole program. It is made when it is first asked for, and anew where a
+        station has other settings than were known then.
+        """
+        with self._steering:
+            made = self._teleoperation
+            if made is None or made.settings != platform.settings.teleoperation:
+                if made is not None:
+                    made.close()
+                made = Teleoperation(platform, self._policy, folder=self._folder)
+                self._teleoperation = made
+                if self.end_requested:
+                    made.close()
+            return made
+
+    def _end_teleoperation(self) -> None:
+        with self._steering:
+            if self._teleoperation is not None:
+                self._teleoperation.close()
+
+    @property
+    @abstractmethod
+    def scene(self) -> SceneModel | None:
+        """What is watched for collisions; None without a scene, or before it is known here."""
 
     @property
     @abstractmethod

@@ -4,6 +4,7 @@ import math
 import secrets
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Literal, overload
 
 from PySide6.QtCore import QObject, Qt
@@ -40,7 +41,8 @@ from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.news import SentMotion
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.motion.device_commander import DeviceCommander
-from cosmic.mico.core.motion.messages import Order
+from cosmic.mico.core.motion.manager import DeviceManager
+from cosmic.mico.core.motion.messages import Order, PositionChanged
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import (
     Calibrate,
@@ -54,7 +56,6 @@ from cosmic.mico.core.motion.orders import (
     ToEndStop,
 )
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState, Status, class_for
-from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.settings import MicoSettings, PositionerSettings
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 
@@ -69,10 +70,10 @@ class Axis(AxisShape, Declared):
     """
 
     commander: DeviceCommander
-    """Hears of the axis, and commands it where its device is here."""
+    """Its signals tell what happens; where its device is here, it commands it as well."""
     _far: RemoteAxisState | None = None
 
-    def __init__(self, name: str, manager: ManagerPort, commander: DeviceCommander) -> None:
+    def __init__(self, name: str, manager: DeviceManager, commander: DeviceCommander) -> None:
         self._name = name
         self._manager = manager
         self._channel = manager.address(name).channel
@@ -86,6 +87,8 @@ class Axis(AxisShape, Declared):
             raise TypeError(f"policy must be a FailurePolicy, not {str(policy)[:60]}")
         self._name = key
         self._far = RemoteAxisState(key)
+        self.commander = DeviceCommander("")  # tells what the station does, and commands nothing
+        self._far.changed.subscribe(self._on_far_changed)
         self._movable = AxisMovable(self)
 
     @property
@@ -166,6 +169,11 @@ class Axis(AxisShape, Declared):
         return found.settings
 
     @property
+    def _commanded_by(self) -> str:
+        """Who commands through this object, for the log."""
+        return self.commander.source
+
+    @property
     def _platform(self) -> MicoSettings:
         return self._manager.settings if self._far is None else self._far.platform()
 
@@ -217,7 +225,7 @@ class Axis(AxisShape, Declared):
 
     @collision_detection.setter
     def collision_detection(self, on: bool) -> None:
-        self.watch(on, source=self.commander.source)
+        self.watch(on, source=self._commanded_by)
 
     @property
     def linked_to(self) -> dict[str, float]:
@@ -309,6 +317,12 @@ class Axis(AxisShape, Declared):
         super().note_change()
         if self._far is not None:
             self._far.changed.emit(self.details)
+
+    def _on_far_changed(self, state: PositionerState) -> None:
+        self.commander.state_changed.emit(state)
+        if state.position is not None:
+            changed = PositionChanged(state.name, state.position, state.unit)
+            self.commander.position_changed.emit(changed)
 
     def check(self, position: Number, *, consent: bool = False) -> MoveVerdict:
         """Return the gate's answer to `move_to(position)`, without moving."""
@@ -407,7 +421,7 @@ class Axis(AxisShape, Declared):
             key=key,
             follows=before,
             alone=alone,
-            source=self.commander.source,
+            source=self._commanded_by,
         )
         far.keys[begun] = key
         return begun
@@ -462,7 +476,9 @@ class Axis(AxisShape, Declared):
         source: str = "",
     ) -> Order:
         if current_call() is None:
-            return self.commander.order(self._channel, motion, consent=consent, follows=follows)
+            return self.commander.order(
+                self._channel, motion, consent=consent, follows=follows, source=source
+            )
         order = Order(
             self._channel,
             motion,
@@ -484,7 +500,7 @@ class Axis(AxisShape, Declared):
         try:
             orders = self._manager.order_together(
                 {self._name: motion},
-                source=source_of(source or self.commander.source),
+                source=source_of(source or self._commanded_by),
                 consent=consent,
                 follows=before,
             )
@@ -587,29 +603,58 @@ class Axis(AxisShape, Declared):
         if direction not in (1, -1) or not 0.0 < wanted <= state.frequency_range_hz[1]:
             text = f"{self._name}: jog in direction 1 or -1 with a speed above 0"
             raise refusal(refuse(Reason.NOT_FINITE, text, axis=self._name))
-        motion = Jog(direction, wanted)
-        if self._far is None:
-            order = self._order(motion, consent=consent)
-            return Jogging(
-                order.movement,
-                lambda: self.commander.renew_jog(order),
-                lambda: self.commander.stop(self._channel, "jog ended"),
-            )
-        key = secrets.token_hex(8)
-        movement = self.begin_jog(motion, key, consent=consent, source=self.commander.source)
-        return Jogging(movement, lambda: self.renew(key), lambda: self.halt("jog ended"))
+        return self._jogging(Jog(direction, wanted), consent=consent)
+
+    def steer(
+        self, velocity: Number, *, dead_man_s: float, consent: bool = False, source: str = ""
+    ) -> Jogging:
+        """Move at a signed speed that `Jogging.renew` changes, as a hand steers; does not wait.
+
+        Parameters
+        ----------
+        velocity : float
+            In `unit` per second; in Hz for an axis without sensor. Its sign is the direction.
+        dead_man_s : float
+            It stops when nobody renews it for so long, on the wall clock.
+        source : str
+            Who commands, for the log; who made this object where it is empty.
+
+        Raises
+        ------
+        MoveRefused
+            `velocity` is no sensible number, or `dead_man_s` is too long.
+        """
+        state = self.details
+        by_steps = not class_for(state.kind, state.positioner).has_sensor
+        wanted = as_number(velocity, "Hz" if by_steps else state.unit, self._name)
+        if wanted == 0.0:
+            text = f"{self._name}: steer at a speed other than 0; end it to stand still"
+            raise refusal(refuse(Reason.NOT_FINITE, text, axis=self._name))
+        _check_dead_man(self._name, dead_man_s)
+        return self._jogging(Steer.at(wanted, dead_man_s), consent=consent, source=source)
+
+    def _jogging(self, motion: Jog, *, consent: bool, source: str = "") -> Jogging:
+        if self._far is not None:
+            key, said = secrets.token_hex(8), source or self._commanded_by
+            movement = self.begin_jog(motion, key, consent=consent, source=said)
+            return Jogging(movement, partial(self.renew, key), self.halt)
+        order = self._order(motion, consent=consent, source=source)
+
+        def renew(velocity: float | None) -> None:
+            if velocity is None:
+                self.commander.renew_jog(order)
+            else:
+                self.commander.steer_on(order, finite(velocity, f"{self._name}: a speed"))
+
+        return Jogging(order.movement, renew, partial(self.commander.stop, self._channel))
 
     @command(moves=True, limit_s=JOG_LIMIT_S)
     def begin_jog(
         self, motion: Jog | Steer, key: str, *, consent: bool = False, source: str = "script"
     ) -> Movement:
         """Begin to move continuously, while `renew` comes with the same key."""
-        if isinstance(motion, Steer) and not 0.0 < motion.dead_man_s <= MOVE_LIMIT_S:
-            text = (
-                f"{self._name}: a dead-man time is at most {MOVE_LIMIT_S:g} s, "
-                f"not {motion.dead_man_s:g}"
-            )
-            raise refusal(refuse(Reason.LIMIT, text, axis=self._name, limit=MOVE_LIMIT_S, unit="s"))
+        if isinstance(motion, Steer):
+            _check_dead_man(self._name, motion.dead_man_s)
         order = self._order(motion, consent=consent, source=source)
         self._orders.keep(key, order)
         return order.movement
@@ -827,3 +872,10 @@ class Axis(AxisShape, Declared):
             raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the platform file")
         change = model.take_in if on else model.take_out
         change(self._name, source=source_of(source))
+
+
+def _check_dead_man(axis: str, dead_man_s: float) -> None:
+    """Raise `MoveRefused` where nobody would notice for too long that a hand is gone."""
+    if not 0.0 < dead_man_s <= MOVE_LIMIT_S:
+        text = f"{axis}: a dead-man time is at most {MOVE_LIMIT_S:g} s, not {dead_man_s:g}"
+        raise refusal(refuse(Reason.LIMIT, text, axis=axis, limit=MOVE_LIMIT_S, unit="s"))

@@ -1,14 +1,54 @@
 """The collision model as scripts and windows see it: ``rig.mico.collision``."""
 
-from contextlib import AbstractContextManager
+from abc import abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Protocol
 
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable
-from cosmic.mico.api.ports import CollisionPort
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.callback import CollisionCallbackBase
-from cosmic.mico.core.collision.model import BodyPair, SceneModel, pair_of
-from cosmic.mico.core.ports import ManagerPort
+from cosmic.mico.core.collision.collision_manager import CollisionManager
+from cosmic.mico.core.collision.model import SceneModel, pair_of
+
+
+class Watchable(Protocol):
+    """An axis that can be taken out of collision detection."""
+
+    @abstractmethod
+    def watch(self, on: bool, *, source: str = "script") -> None:
+        """Check its movements for collisions, or no longer."""
+
+
+class WatchedPlatform(Protocol):
+    """What `Mico` declares of collisions, here or at a station."""
+
+    @property
+    @abstractmethod
+    def taken_out(self) -> tuple[str, ...]:
+        """Axes taken out of collision detection."""
+
+    @property
+    @abstractmethod
+    def allowed_contacts(self) -> tuple[str, ...]:
+        """Contacts that are allowed now."""
+
+    @abstractmethod
+    def __getitem__(self, name: str) -> Watchable:
+        """Return an axis; raises `UnknownAxisError`."""
+
+    @abstractmethod
+    def positions(self) -> dict[str, float] | None:
+        """Return where every axis is; None while one is not known."""
+
+    @abstractmethod
+    def nearest(self, positions: dict[str, float]) -> Approach | None:
+        """Return the nearest pair of bodies with the axes at `positions`."""
+
+    @abstractmethod
+    def set_contact(self, name: str, *, allowed: bool, source: str = "script") -> None:
+        """Let the bodies of an operation touch, or watch them again."""
 
 
 @checked_class
@@ -17,28 +57,28 @@ class Collision:
 
     Parameters
     ----------
+    model : CollisionManager or None
+        Where it is checked, when that is here.
     source : str
         Who commands through this object, for the log.
     """
 
-    def __init__(self, manager: ManagerPort, model: CollisionPort, source: str) -> None:
-        self._manager = manager
+    def __init__(
+        self,
+        platform: WatchedPlatform,
+        scene: SceneModel,
+        model: CollisionManager | None,
+        source: str,
+    ) -> None:
+        self._platform = platform
+        self._scene = scene
         self._model = model
         self._source = source
 
     @property
     def scene(self) -> SceneModel:
-        """The bodies, joints and pairs that are watched.
-
-        Raises
-        ------
-        NotAvailable
-            The platform is at another station, and its scene is not known here.
-        """
-        scene = self._model.model
-        if scene is None:
-            raise NotAvailable("the scene is not known in this process; ask at its station")
-        return scene
+        """The bodies, joints and pairs that are watched."""
+        return self._scene
 
     def clearance(self) -> Approach:
         """Return the nearest pair of watched bodies where they stand now.
@@ -50,10 +90,10 @@ class Collision:
         CosmicError
             The collision model does not answer.
         """
-        positions = self._manager.positions()
+        positions = self._platform.positions()
         if positions is None:
             raise NotAvailable("clearance is not known before every axis is referenced")
-        nearest = self._model.nearest(positions)
+        nearest = self._platform.nearest(positions)
         if nearest is None:
             raise NotAvailable("no two bodies of the scene are watched")
         return nearest
@@ -63,14 +103,15 @@ class Collision:
     @property
     def contacts(self) -> tuple[str, ...]:
         """Names of the operations during which some bodies may touch."""
-        return tuple(each.name for each in self.scene.contacts)
+        return tuple(each.name for each in self._scene.contacts)
 
     @property
     def allowed_contacts(self) -> frozenset[str]:
         """Those that are allowed now."""
-        return self._model.allowed_contacts
+        return frozenset(self._platform.allowed_contacts)
 
-    def contact(self, name: str) -> AbstractContextManager[None]:
+    @contextmanager
+    def contact(self, name: str) -> Iterator[None]:
         """Let the bodies of an operation touch while the block runs.
 
         Raises
@@ -78,7 +119,15 @@ class Collision:
         NotAvailable
             The scene has no operation of that name.
         """
-        return self._model.contact(name)
+        if self._model is not None:  # which counts blocks within blocks
+            with self._model.contact(name, source=self._source):
+                yield
+            return
+        self._platform.set_contact(name, allowed=True, source=self._source)
+        try:
+            yield
+        finally:
+            self._platform.set_contact(name, allowed=False, source=self._source)
 
     def set_callback(self, one: str, other: str, callback: CollisionCallbackBase | None) -> None:
         """Let two bodies have a response of their own; None takes it back.
@@ -86,22 +135,25 @@ class Collision:
         Raises
         ------
         NotAvailable
-            The scene has no such bodies.
+            The scene has no such bodies, or it is checked at another station: a function cannot
+            travel.
         """
         for body in (one, other):
-            if body not in self.scene.body_number:
+            if body not in self._scene.body_number:
                 raise NotAvailable(
-                    f"there is no body {body!r}; the scene has {', '.join(self.scene.bodies)}"
+                    f"there is no body {body!r}; the scene has {', '.join(self._scene.bodies)}"
                 )
-        pair: BodyPair = pair_of(one, other)
-        self._model.set_callback(pair, callback)
+        if self._model is None:
+            text = f"{one} and {other}: a response of its own can be set at the station only"
+            raise NotAvailable(text)
+        self._model.set_callback(pair_of(one, other), callback)
 
     # What is watched (MiCoCL.13)
 
     @property
     def unwatched(self) -> frozenset[str]:
         """Axes taken out of collision detection."""
-        return self._model.taken_out
+        return frozenset(self._platform.taken_out)
 
     def take_out(self, axis: str) -> None:
         """Let an axis move without being checked for collisions; loud in window and log.
@@ -111,8 +163,8 @@ class Collision:
         UnknownAxisError
             There is no such axis.
         """
-        self._model.take_out(axis, source=self._source)
+        self._platform[axis].watch(False, source=self._source)
 
     def take_in(self, axis: str) -> None:
         """Check the movements of an axis for collisions again."""
-        self._model.take_in(axis, source=self._source)
+        self._platform[axis].watch(True, source=self._source)

@@ -11,10 +11,10 @@ from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import MoveCancelled
 from cosmic.frame.operation import Operation, Task
 from cosmic.mico.core.motion.group_start import GroupStart
+from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import Motion
-from cosmic.mico.core.ports import ManagerPort
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +135,7 @@ class LinkedMovement(Movement):
 
 
 def move_together(
-    manager: ManagerPort,
+    manager: DeviceManager,
     motions: Mapping[str, Motion],
     task: Task,
     *,

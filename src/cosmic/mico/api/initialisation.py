@@ -17,8 +17,8 @@ from cosmic.frame.errors import (
 from cosmic.frame.operation import Task
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.api.group import move_together
+from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.positioner import Confidence
-from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.sequence.plan import PlannedStep, plan_sequence
 from cosmic.mico.core.sequence.report import SequenceReport, StepReport, StepState
 from cosmic.mico.core.sequence.settings import StepKind
@@ -67,7 +67,7 @@ class InitialisationRun:
 
     def __init__(
         self,
-        manager: ManagerPort,
+        manager: DeviceManager,
         *,
         skip_known: bool = False,
         confirm: Confirm | None = None,

@@ -8,13 +8,23 @@ from cosmic.mico.core.motion.movement import Movement
 
 
 class Jogging:
-    """A continuous movement that goes on while it is renewed; made by `Axis.jog`.
+    """A continuous movement that goes on while it is renewed; made by `Axis.jog` and `Axis.steer`.
 
     As a context manager it stops at the end of the block.
+
+    Parameters
+    ----------
+    renew : callable
+        Keeps it alive, at a signed speed; at the one it has with None.
+    end : callable
+        Stops it, with the reason.
     """
 
     def __init__(
-        self, movement: Movement, renew: Callable[[], object], end: Callable[[], object]
+        self,
+        movement: Movement,
+        renew: Callable[[float | None], object],
+        end: Callable[[str], object],
     ) -> None:
         self._movement = movement
         self._renew = renew
@@ -30,14 +40,20 @@ class Jogging:
         """True when it has ended: let go, at a limit, stopped or refused."""
         return self._movement.done
 
-    def renew(self) -> None:
-        """Keep it alive; call it at least every 0.1 s. Any thread."""
-        self._renew()
+    def renew(self, velocity: float | None = None) -> None:
+        """Keep it alive; call it at least every 0.1 s. Any thread, and it does not wait.
 
-    def end(self) -> None:
+        Parameters
+        ----------
+        velocity : float
+            Signed speed from now on, of what `Axis.steer` began; None: as it is.
+        """
+        self._renew(velocity)
+
+    def end(self, why: str = "jog ended") -> None:
         """Let go: the axis stops at once."""
         if not self.done:
-            self._end()
+            self._end(why)
 
     def __enter__(self) -> Self:
         return self

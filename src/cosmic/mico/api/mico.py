@@ -37,11 +37,11 @@ from cosmic.mico.api.entry import Number, as_number, finite, one_line, source_of
 from cosmic.mico.api.foresight import foreseen
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.initialisation import Confirm
-from cosmic.mico.api.links import check_linkable, check_links_may_change
 from cosmic.mico.api.news import (
     AxisBegun,
     AxisEnded,
     AxisPositions,
+    AxisRefused,
     MovementNews,
     SentMotion,
     follow_movements,
@@ -56,19 +56,20 @@ from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.collision.model import SceneModel
+from cosmic.mico.core.motion.device import Device
 from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.links import Link
 from cosmic.mico.core.motion.orders import Motion, MoveBy, MoveTo
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState, class_for
 from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.mico.core.motion.undo import UndoEntry, undo_text
-from cosmic.mico.core.ports import DevicePort, ManagerPort
 from cosmic.mico.core.poses import Pose
 from cosmic.mico.core.sequence.report import SequenceReport
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 from cosmic.mico.core.trajectory.binding import AxisFacts, PlatformFacts
 from cosmic.mico.core.trajectory_recorder import Recorded
+from cosmic.mico.hw.interface import PositionerKind
 
 SCENE_LIMIT_S: Final = 10.0
 """How long the shapes of all bodies may take on the way."""
@@ -94,14 +95,19 @@ class Mico(Declared):
     def __init__(self, application: MicoApplication, source: str = "script") -> None:
         self._application: MicoApplicationBase = application
         self._home: MicoApplication = application
-        self._manager: ManagerPort = application.manager
-        self._begin_here(source)
+        self._manager = application.manager
+        self._source = source
+        self._axes: dict[str, Axis] = {}
+        self._commanders: dict[int, DeviceCommander] = {}
+        self._joined: dict[int, Device] = {}
+        self._joining = Lock()
         self._poses = Poses(application.trajectories, source)
         self._trajectories = Trajectories(self, application.trajectories, application.players)
         direct = Qt.ConnectionType.DirectConnection
         manager, changed = application.manager, weakly(self.note_change)
         manager.links_changed.connect(changed, direct)
         manager.changed.connect(changed, direct)
+        manager.changed.connect(weakly(self._connect), direct)
         manager.device_lost.connect(changed, direct)
         application.undo.changed.connect(changed, direct)
         application.status_changed.connect(changed, direct)
@@ -109,14 +115,7 @@ class Mico(Declared):
         manager.latch.subscribe(lambda _state: changed())
         if manager.exemptions is not None:
             manager.exemptions.subscribe(changed)
-        self.belong_to(application)
-
-    def _begin_here(self, source: str) -> None:
-        self._source = source
-        self._commanders: dict[int, DeviceCommander] = {}
-        self._axes: dict[str, Axis] = {}
-        self._joined: dict[int, DevicePort] = {}
-        self._joining = Lock()
+        self._connect()
 
     @override
     def take_lease_of(self, lease: StationLease) -> None:
@@ -128,7 +127,8 @@ class Mico(Declared):
     def set_up_proxy(self, key: str, policy: FailurePolicy) -> None:
         if not isinstance(policy, FailurePolicy):
             raise TypeError(f"policy must be a FailurePolicy, not {str(policy)[:60]}")
-        self._begin_here("script")
+        self._source = "script"
+        self._axes = {}
         self._policy = policy
         self._published_away = ""
 
@@ -138,18 +138,15 @@ class Mico(Declared):
         return _MicoCompanion(self, self._policy)
 
     def belong_to(self, application: MicoApplicationBase, source: str = "") -> None:
-        """Work for an application; for whoever makes one of this."""
+        """Work for an application at this end; for whoever makes a proxy."""
         if not isinstance(application, MicoApplicationBase):
             raise TypeError(f"application must be a MiCo, not {str(application)[:60]}")
-        self._application, self._manager = application, application.manager
+        if not self.remote:
+            raise NotAvailable("this MiCo belongs to the application that it was made with")
+        self._application = application
         self._source = source or self._source
-        if self.remote:
-            self.trajectories.belong_to(self)
-            self.poses.belong_to(self._source)
-        self._connect()
-        # Direct, because a script has no event loop that a queued call could arrive in.
-        direct = Qt.ConnectionType.DirectConnection
-        application.manager.changed.connect(weakly(self._connect), direct)
+        self.trajectories.belong_to(self)
+        self.poses.belong_to(self._source)
 
     @override
     def note_change(self) -> None:
@@ -212,11 +209,7 @@ class Mico(Declared):
         if axis is None:
             raise UnknownAxisError(name, self.names)
         if name not in self._axes:
-            device = self._manager.address(name).device
-            if device not in self._commanders:
-                self._manager.device(name)  # there with the first axis, whoever asks for it first
-                self._connect()
-            axis.commander = self._commanders[device]
+            axis.commander.source = self._source
             if axis.far is not None:
                 axis.far.platform = lambda: self.settings
                 axis.far.foresee = self._foreseen
@@ -324,6 +317,24 @@ class Mico(Declared):
     def stop_state(self) -> StopState:
         """Whether motion is stopped, and why."""
         return self._manager.latch.state
+
+    def follow_stop(self, listener: Callable[[StopState], object]) -> Callable[[], None]:
+        """Call `listener(state)` when motion is stopped or allowed again; returns what ends it.
+
+        In the thread that did it, or that hears of it from the station; it must return at once.
+        """
+        if not self.remote:
+            return self._manager.latch.subscribe(listener)
+        before = self.stop_state
+
+        def look() -> None:
+            nonlocal before
+            now = self.stop_state
+            changed, before = now != before, now
+            if changed:
+                listener(now)
+
+        return self.on_change(look)
 
     @property
     @state
@@ -729,7 +740,7 @@ class Mico(Declared):
     @property
     def teleoperation(self) -> Teleoperation:
         """Steering by a gamepad, keys or a haptic device; one for the whole program."""
-        return self._application.teleoperation
+        return self._application.teleoperation_of(self)
 
     # Trajectories and named poses
 
@@ -799,14 +810,14 @@ class Mico(Declared):
         NotAvailable
             They are linked already, have no sensor, or are not of one kind, or one of them moves.
         """
-        check_linkable(self._manager, first, second)
+        self._check_linkable(first, second)
         self.add_link(first, second, float(ratio))
         return Link(first, second, float(ratio))
 
     @command(moves=True, aside=True)
     def add_link(self, first: str, second: str, ratio: float) -> None:
         """Link two axes; raises as `link`."""
-        check_linkable(self._manager, first, second)
+        self._check_linkable(first, second)
         self._manager.links.add(first, second, finite(ratio, "a ratio"))
 
     def unlink(self, axis: str) -> bool:
@@ -826,8 +837,23 @@ class Mico(Declared):
     @command(moves=True, aside=True)
     def remove_links(self, axis: str) -> None:
         """Take away every link of an axis; raises as `unlink`."""
-        check_links_may_change(self._manager, {axis})
+        self._check_links_may_change(axis)
         self._manager.links.remove(axis)
+
+    def _check_linkable(self, first: str, second: str) -> None:
+        self._check_links_may_change(first, second)
+        kinds = {self[name].kind for name in (first, second)}
+        if len(kinds) > 1 or PositionerKind.OPEN_LOOP in kinds:
+            text = f"{first} and {second} cannot be linked: both must be linear, or both rotary"
+            raise NotAvailable(text)
+
+    def _check_links_may_change(self, *names: str) -> None:
+        """Raise `NotAvailable` where a link that changes would leave an axis to move alone."""
+        linked = {other for name in names for other in self[name].linked_to}
+        moving = sorted(name for name in {*names, *linked} if self[name].details.in_motion)
+        if moving:
+            text = f"{', '.join(moving)} is moving; change the links when it is stationary"
+            raise NotAvailable(text)
 
     # Taking back
 
@@ -871,7 +897,7 @@ class Mico(Declared):
         doubts = () if confirm else self.undo_doubts(entry)
         if doubts:
             raise NotAvailable(
-                f"going back would move {undo_text(entry, self._manager.states())}, but "
+                f"going back would move {undo_text(entry, self.states())}, but "
                 f"{'; '.join(doubts)}. Look where it goes, then undo with confirm=True"
             )
         movement = self.begin_undo(entry.number)
@@ -915,10 +941,12 @@ class Mico(Declared):
     @property
     def collision(self) -> Collision:
         """What is watched for collisions; raises `NotAvailable` without a collision model."""
-        model = self._application.collision
-        if model is None or not model.available:
+        if not self.checks_collisions:
             raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the platform file")
-        return Collision(self._manager, model, self._source)
+        scene = self._application.scene
+        if scene is None:
+            raise NotAvailable("the scene of the station has not arrived yet")
+        return Collision(self, scene, None if self.remote else self._model, self._source)
 
     @property
     def scene_model(self) -> SceneModel:
@@ -976,6 +1004,7 @@ class _MicoCompanion(Companion):
     def on_opened(self) -> None:
         self._ends.append(self._policy.on_safe_stop(self._on_safe_stop))
         self._ends.append(self._mico.follow_positions(self._on_positions))
+        self._ends.append(self._mico.follow_movements(self._on_movement))
 
     @override
     def close(self) -> None:
@@ -998,6 +1027,13 @@ class _MicoCompanion(Companion):
             if axis is not None and axis.far is not None:
                 axis.far.move(position, std, read_wall_s)
                 axis.far.changed.emit(axis.details)
+
+    def _on_movement(self, news: MovementNews) -> None:
+        axes = self._mico.axes
+        if isinstance(news, AxisEnded) and news.name in axes:
+            axes[news.name].commander.movement_ended.emit(news.heard())
+        elif isinstance(news, AxisRefused) and not news.together and news.verdict.axis in axes:
+            axes[news.verdict.axis].commander.movement_refused.emit(news.verdict)
 
 
 @runtime_checkable

@@ -11,12 +11,12 @@ from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Operation, Task
 from cosmic.frame.task_application import Job
-from cosmic.mico.api.ports import CollisionPort
 from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
+from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.motion.checks import Limits
+from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState, class_for
-from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.poses import PoseBook, pose_misfits
 from cosmic.mico.core.trajectory.binding import AxisFacts, Bound, PlatformFacts
 from cosmic.mico.core.trajectory.clearance import ClearanceSearch
@@ -30,11 +30,11 @@ class Worker(Protocol):
     """What carries out long operations and finds ways: the application."""
 
     @property
-    def manager(self) -> ManagerPort:
+    def manager(self) -> DeviceManager:
         """Where the axes are."""
 
     @property
-    def collision(self) -> CollisionPort | None:
+    def collision(self) -> CollisionManager | None:
         """The collision model, where there is one."""
 
     def begin(self, title: str, job: Job) -> Task:
@@ -175,7 +175,7 @@ class TrajectorySite:
 
     def _pure_gate(self, bound: Bound) -> tuple[CollisionChecker, ClearanceSearch | None]:
         live = self.worker.collision
-        if live is None or live.model is None:
+        if live is None:
             return NoCollisionModel(), None
         if self._answers is None:
             self._answers = PureAnswers(live.model)

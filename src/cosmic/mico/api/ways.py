@@ -8,9 +8,9 @@ from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.frame.operation import Task
 from cosmic.frame.renamed import renamed_in
 from cosmic.mico.api.group import move_together
+from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.orders import Motion, MoveTo
 from cosmic.mico.core.planning.problem import Plan
-from cosmic.mico.core.ports import ManagerPort
 
 __getattr__ = renamed_in(__name__, {"Way": "PlannedPath"})
 
@@ -54,7 +54,7 @@ def way_from_plan(plan: Plan) -> PlannedPath:
     )
 
 
-def follow(manager: ManagerPort, way: PlannedPath, task: Task, source: str) -> None:
+def follow(manager: DeviceManager, way: PlannedPath, task: Task, source: str) -> None:
     """Go `way` part by part and end `task`; in the application's thread.
 
     The gate decides each part again when its turn comes.

@@ -1,8 +1,8 @@
 """`ClearanceWatch`: keeps an eye on the nearest pair of bodies, for meters and views."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from threading import Event
-from typing import Final, Protocol
+from typing import Final
 
 from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
@@ -15,18 +15,13 @@ from cosmic.mico.core.collision.answer import Approach
 PERIOD_S: Final = 0.05
 
 
-class Measures(Protocol):
-    """What can say how near the nearest pair is."""
-
-    def nearest(self, positions: Mapping[str, float]) -> Approach | None:
-        """Return the nearest pair with the axes at `positions`; raises `CosmicError`."""
-
-
 class ClearanceWatch(WorkerThread):
     """Asks for the nearest pair at most 20 times a second, and only when something has moved.
 
     Parameters
     ----------
+    nearest : callable
+        Returns the nearest pair with the axes at some positions; raises `CosmicError`.
     positions : callable
         Returns the position of every axis in gate coordinates; None while one is not known.
 
@@ -40,13 +35,13 @@ class ClearanceWatch(WorkerThread):
 
     def __init__(
         self,
-        measures: Measures,
-        positions: Callable[[], Mapping[str, float] | None],
+        nearest: Callable[[dict[str, float]], Approach | None],
+        positions: Callable[[], dict[str, float] | None],
         policy: FailurePolicy,
         parent: QObject | None = None,
     ) -> None:
         super().__init__("clearance", policy, parent)
-        self._measures = measures
+        self._nearest = nearest
         self._positions = positions
         self._wake = Event()
         self._latest: Approach | None = None
@@ -63,20 +58,20 @@ class ClearanceWatch(WorkerThread):
 
     @override
     def run_body(self) -> None:
-        seen: Mapping[str, float] | None = {}
+        seen: dict[str, float] | None = {}
         while not self.end_requested:
             positions = self._positions()
             if positions != seen and self._look(positions):
                 seen = positions
             self._wake.wait(PERIOD_S)
 
-    def _look(self, positions: Mapping[str, float] | None) -> bool:
+    def _look(self, positions: dict[str, float] | None) -> bool:
         """Tell what is nearest; return False where nobody could say, to ask again."""
         answered = True
         nearest: Approach | None = None
         if positions is not None:
             try:
-                nearest = self._measures.nearest(positions)
+                nearest = self._nearest(positions)
             except CosmicError:
                 answered = False  # the gate says it too, and louder
         if nearest != self._latest:

@@ -36,7 +36,7 @@ class CommanderType(Flag):
 
 
 class Commanded(Protocol):
-    """What a commander is joined to: a `Device`, or its counterpart of another process."""
+    """What a commander is joined to: a `Device`."""
 
     @property
     @abstractmethod
@@ -188,8 +188,7 @@ class DeviceCommander(QObject):
 
     def steer(self, channel: int, velocity: float, *, dead_man_s: float) -> Order:
         """Begin to move at a signed speed that `steer_on` changes; it ends when that stays away."""
-        direction = 1 if velocity > 0.0 else -1
-        return self.order(channel, Steer(direction, abs(velocity), dead_man_s), consent=False)
+        return self.order(channel, Steer.at(velocity, dead_man_s), consent=False)
 
     def steer_on(self, order: Order, velocity: float) -> None:
         """Keep the movement begun by `steer` alive at `velocity`; only the newest counts."""
@@ -213,15 +212,20 @@ class DeviceCommander(QObject):
         return self.order(channel, motion, consent=consent, follows=follows).movement
 
     def order(
-        self, channel: int, motion: Motion, *, consent: bool, follows: Movement | None = None
+        self,
+        channel: int,
+        motion: Motion,
+        *,
+        consent: bool,
+        follows: Movement | None = None,
+        source: str = "",
     ) -> Order:
-        """Send any motion, and return the order that it is."""
+        """Send any motion, and return the order that it is; from `source` where one is given."""
         device = self._device
         if device is None:
             raise NotConnectedError("this commander is connected to no device, or only listens")
         epoch = None if self._latch is None else self._latch.state.epoch
-        order = Order(
-            channel, motion, self._token, self.source, consent, follows=follows, epoch=epoch
-        )
+        said = source or self.source
+        order = Order(channel, motion, self._token, said, consent, follows=follows, epoch=epoch)
         device.submit(order)
         return order

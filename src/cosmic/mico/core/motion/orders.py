@@ -55,6 +55,11 @@ class Steer(Jog):
 
     dead_man_s: float
 
+    @classmethod
+    def at(cls, velocity: float, dead_man_s: float) -> "Steer":
+        """Return what goes at a signed speed."""
+        return cls(1 if velocity > 0.0 else -1, abs(velocity), dead_man_s)
+
 
 @dataclass(frozen=True, slots=True)
 class Calibrate:

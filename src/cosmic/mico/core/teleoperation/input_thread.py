@@ -13,7 +13,7 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import WorkerThread
-from cosmic.mico.core.motion.stop_latch import StopLatch
+from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.mico.core.teleoperation.driver import AxisDriver
 from cosmic.mico.core.teleoperation.mapping import Converter, ProfileMapping
 from cosmic.mico.core.teleoperation.settings import TeleoperationSettings
@@ -39,6 +39,8 @@ class Steering:
         May be exchanged while it runs.
     converter : Converter
         Between inputs and movements; the mapping, or what a station puts in front of it.
+    stop_state : callable
+        Returns whether motion is stopped.
     stop : callable
         Stops everything, with the reason; for the device's own stop button.
     slowed : callable
@@ -50,7 +52,7 @@ class Steering:
     converter: Converter
     drivers: Mapping[str, AxisDriver]
     settings: TeleoperationSettings
-    latch: StopLatch
+    stop_state: Callable[[], StopState]
     stop: Callable[[str], None]
     commands: RateMeter
     slowed: Callable[[], float] = lambda: 1.0
@@ -76,7 +78,7 @@ class InputThread(WorkerThread):
         self._pressed: frozenset[str] = frozenset()
         self._inputs: InputState | None = None
         self._velocities: Mapping[str, float] = {}
-        self._epoch = steering.latch.state.epoch
+        self._epoch = steering.stop_state().epoch
         self._force: Mapping[str, float] = {}
         self._force_number = self._felt_number = 0
         self._polls, self._feels = RateMeter(), RateMeter()
@@ -174,7 +176,7 @@ class InputThread(WorkerThread):
 
     def _loss(self, inputs: InputState) -> str:
         """Return why nothing may follow this device any more; empty when it may."""
-        stop = self._steering.latch.state
+        stop = self._steering.stop_state()
         if stop.latched or stop.epoch != self._epoch:
             return stop.reason or "everything was stopped"
         if not inputs.connected:

@@ -1,21 +1,21 @@
 """`Teleoperation`: one input device steers positioners by one profile (M9, thesis MiCo4)."""
 
 import logging
-from collections.abc import Mapping
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from threading import RLock
+from typing import Protocol
 
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.config import user_file
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
-from cosmic.mico.core.motion.device_commander import DeviceCommander
-from cosmic.mico.core.motion.positioner import class_for
 from cosmic.mico.core.motion.stop_latch import StopState
-from cosmic.mico.core.ports import ManagerPort
+from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.teleoperation.coupling import ForceCoupling
-from cosmic.mico.core.teleoperation.driver import AxisDriver
+from cosmic.mico.core.teleoperation.driver import AxisDriver, SteeredAxis
 from cosmic.mico.core.teleoperation.input_thread import InputThread, Steering
 from cosmic.mico.core.teleoperation.mapping import Converter, ProfileMapping
 from cosmic.mico.core.teleoperation.profile_book import ProfileBook
@@ -33,6 +33,42 @@ logger = logging.getLogger(__name__)
 SOURCE = "teleoperation"
 
 
+class SteeredPlatform(Protocol):
+    """The axes that an input device may steer; `Mico` of the scripted API, wherever they are."""
+
+    @property
+    @abstractmethod
+    def settings(self) -> MicoSettings:
+        """What the platform file says."""
+
+    @property
+    @abstractmethod
+    def simulated(self) -> bool:
+        """True when no hardware moves."""
+
+    @property
+    @abstractmethod
+    def ready(self) -> bool:
+        """True while axes can be moved."""
+
+    @property
+    @abstractmethod
+    def stop_state(self) -> StopState:
+        """Whether motion is stopped, and why."""
+
+    @abstractmethod
+    def __getitem__(self, name: str) -> SteeredAxis:
+        """Return an axis; raises `UnknownAxisError`."""
+
+    @abstractmethod
+    def stop(self, reason: str = "stop") -> None:
+        """Stop every axis now, past every queue."""
+
+    @abstractmethod
+    def follow_stop(self, listener: Callable[[StopState], object]) -> Callable[[], None]:
+        """Call `listener` when motion is stopped or allowed again; returns what ends it."""
+
+
 @checked_class
 class Teleoperation:
     """Starts and ends the steering by an input device; any thread.
@@ -42,30 +78,29 @@ class Teleoperation:
 
     def __init__(
         self,
-        manager: ManagerPort,
+        platform: SteeredPlatform,
         policy: FailurePolicy,
         sources: InputSources | None = None,
         folder: Path | None = None,
     ) -> None:
-        self._manager = manager
+        self._platform = platform
         self._policy = policy
-        self.settings = manager.settings.teleoperation
+        self.settings = platform.settings.teleoperation
         self.sources = sources or make_sources(
-            self.settings.inputs, self.settings.input, simulated=manager.controller.simulated
+            self.settings.inputs, self.settings.input, simulated=platform.simulated
         )
         self.coupling: ForceCoupling | None = None
         self._book = ProfileBook(self.settings, user_file(self.settings.profiles, folder))
-        for text in self._book.misfits(manager.settings.kinds):
+        for text in self._book.misfits(platform.settings.kinds):
             logger.warning("%s: %s", self._book.path, text)
         self._lock = RLock()
         self._thread: InputThread | None = None
         self._device: InputDevice | None = None
-        self._commanders: list[DeviceCommander] = []
         self._stuck: list[InputThread] = []
         self._focus = True
         self._closed = False
         self._over = TeleoperationState(TeleoperationPhase.OFF)
-        manager.latch.subscribe(self._on_latch)
+        self._end_stops = platform.follow_stop(self._on_stop)
 
     # What there is
 
@@ -116,7 +151,7 @@ class Teleoperation:
         ConfigError
             It does not fit the positioners there are, or moves others while it steers.
         """
-        wrong = profile.mistakes(self._manager.settings.kinds)
+        wrong = profile.mistakes(self._platform.settings.kinds)
         if wrong:
             raise ConfigError("\n".join(wrong))
         with self._lock:
@@ -190,8 +225,8 @@ class Teleoperation:
         logger.info("teleoperation: %s steers %r", opened.info.title, profile)
 
     def _refuse_if_not_ready(self) -> None:
-        stop = self._manager.latch.state
-        if self._closed or not self._manager.ready:
+        stop = self._platform.stop_state
+        if self._closed or not self._platform.ready:
             raise NotAvailable("MiCo is not ready; wait, or rescan")
         if stop.latched:
             raise NotAvailable(f"motion is stopped ({stop.reason}); reset the stop first")
@@ -201,46 +236,33 @@ class Teleoperation:
 
     def _steering(self, device: InputDevice, profile: TeleoperationProfileSettings) -> Steering:
         mapping, commands = self._mapping(profile), RateMeter()
-        token = self._manager.lease.local_token
-        by_device: dict[int, DeviceCommander] = {}
-        drivers: dict[str, AxisDriver] = {}
-        for name in mapping.positioners:
-            address, state = self._manager.address(name), self._manager.state(name)
-            commander = by_device.get(address.device)
-            if commander is None:
-                commander = by_device[address.device] = DeviceCommander(token, SOURCE)
-                self._manager.connect_device_commander(address.device, commander)
-            drivers[name] = AxisDriver(
-                name,
-                address.channel,
-                commander,
-                self.settings,
-                sensor=class_for(state.kind, state.positioner).has_sensor,
-                commands=commands,
-            )
-        self._commanders = list(by_device.values())
-        coupling = self.coupling
+        platform, coupling = self._platform, self.coupling
+        drivers = {
+            name: AxisDriver(platform[name], self.settings, source=SOURCE, commands=commands)
+            for name in mapping.positioners
+        }
         return Steering(
             device=device,
             mapping=mapping,
             converter=self._converter(mapping),
             drivers=drivers,
             settings=self.settings,
-            latch=self._manager.latch,
-            stop=self._manager.stop,
+            stop_state=lambda: platform.stop_state,
+            stop=platform.stop,
             commands=commands,
             slowed=coupling.slowed if coupling is not None else lambda: 1.0,
         )
 
     def _mapping(self, profile: TeleoperationProfileSettings) -> ProfileMapping:
-        jog = self._manager.settings.jog
+        settings = self._platform.settings
+        jog = settings.jog
         usual = {
             "linear": jog.speed_um_s,
             "rotary": jog.speed_deg_s,
             "open-loop": float(jog.frequency_hz),
         }
-        speeds = {name: usual[kind] for name, kind in self._manager.settings.kinds.items()}
-        return ProfileMapping(profile, speeds, lambda name: self._manager.state(name).position)
+        speeds = {name: usual[kind] for name, kind in settings.kinds.items()}
+        return ProfileMapping(profile, speeds, lambda name: self._platform[name].details.position)
 
     def _converter(self, mapping: ProfileMapping) -> Converter:
         return mapping if self.coupling is None else self.coupling.make_converter(mapping)
@@ -267,9 +289,6 @@ class Teleoperation:
             self._device = None
             if self.coupling is not None:
                 self.coupling.end()
-            for commander in self._commanders:
-                commander.detach()
-            self._commanders = []
 
     def set_focus(self, focus: bool) -> None:
         """Say whether the window has the operator's attention; nothing moves while it has not."""
@@ -284,7 +303,7 @@ class Teleoperation:
         if thread is not None:
             thread.feel(force)
 
-    def _on_latch(self, state: StopState) -> None:
+    def _on_stop(self, state: StopState) -> None:
         """End at once; the thread sees the latch as well, but may just wait for its next look."""
         thread = self._thread
         if state.latched and thread is not None:
@@ -293,5 +312,6 @@ class Teleoperation:
     def close(self) -> None:
         """End the steering for good and give all devices back."""
         self._closed = True
+        self._end_stops()
         self.stop()
         self.sources.close()

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from threading import Event
 from typing import Final
 
-from PySide6.QtCore import QObject, Qt
+from PySide6.QtCore import QObject
 from typing_extensions import override
 
 from cosmic.frame.application import GuiFactory
@@ -18,22 +18,19 @@ from cosmic.frame.operation import Operation, Progress, Task
 from cosmic.frame.threads import may_wait_here
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.initialisation import POLL_S, Confirm
-from cosmic.mico.api.manager_elsewhere import ManagerElsewhere
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.api.mirrors import CollisionElsewhere
 from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.motion.undo import Cautions
 from cosmic.mico.core.sequence.report import SequenceReport
-from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 
 FIRST_WORD_S: Final = 10.0
 """How long `initialize` waits for the station, where it may wait."""
 _CLOSED: Final = "MiCo is closed here"
 
 
-class MicoElsewhere(MicoApplicationBase):
+class MicoClient(MicoApplicationBase):
     """Shows and commands the axes of a station as if they were here.
 
     Everything goes through `Mico`, as the station declares it. Initialisation, detours, poses
@@ -49,8 +46,6 @@ class MicoElsewhere(MicoApplicationBase):
         What is declared there.
     """
 
-    manager: ManagerElsewhere
-    collision: CollisionElsewhere
     clearance_watch: ClearanceWatch
 
     def __init__(
@@ -62,23 +57,20 @@ class MicoElsewhere(MicoApplicationBase):
         gui_factory: GuiFactory | None = None,
         parent: QObject | None = None,
     ) -> None:
-        super().__init__("MiCo", policy, gui_factory, parent)
+        super().__init__(policy, None, gui_factory, parent)
         self._link = ApplicationLink(kind, transport, "mico", policy)
         self._kind = kind
         self._background = BackgroundJobs("mico learns", policy)
         self._known = Event()
-        self._asked = self._dressed = self._closed = False
+        self._asked = self._closed = False
+        self._outline: tuple[object, ...] = ()
         self._report = SequenceReport(())
+        self._scene: SceneModel | None = None
         self._micos: dict[str, Mico] = {}
-        self._end_movements: Callable[[], None] = lambda: None
         self.api: Mico = proxy_of(kind, self._link)
-        self.manager = ManagerElsewhere(self.api, policy)
         self.api.belong_to(self)
-        self.collision = self.manager.collision
-        self.clearance_watch = ClearanceWatch(self.collision, self.manager.positions, policy)
-        self.cautions = Cautions()  # what the station felt stands in the entries it tells
-        self.teleoperation = Teleoperation(self.manager, policy)
-        self.manager.changed.connect(self.status_changed, Qt.ConnectionType.DirectConnection)
+        self.clearance_watch = ClearanceWatch(self.api.nearest, self.api.positions, policy)
+        self.cautions = Cautions()  # what the station felt stands in the entries it publishes
         self.api.on_change(self._on_change)
 
     def mico(self, source: str) -> Mico:
@@ -96,6 +88,11 @@ class MicoElsewhere(MicoApplicationBase):
 
     @property
     @override
+    def scene(self) -> SceneModel | None:
+        return self._scene
+
+    @property
+    @override
     def initialisation(self) -> SequenceReport:
         return self.api.initialisation
 
@@ -110,7 +107,6 @@ class MicoElsewhere(MicoApplicationBase):
         """
         self.start()
         self._link.open()
-        self._end_movements = self.api.follow_movements(self.manager.take_news)
         if may_wait_here():
             self._known.wait(FIRST_WORD_S)
 
@@ -119,19 +115,22 @@ class MicoElsewhere(MicoApplicationBase):
         """Do what `initialize` does without waiting, for windows."""
         self.start()
         self._link.open()
-        self._end_movements = self.api.follow_movements(self.manager.take_news)
         task = Task("Looking for the station")
         task.finish()
         return task
 
     def _on_change(self) -> None:
         """Take note of a new state, in the thread that hears of it."""
-        self.manager.take_state()
-        report = self.api.initialisation
+        api = self.api
+        outline = (api.ready, api.failure, tuple(api.axes), api.missing)
+        if outline != self._outline:
+            self._outline = outline
+            self.status_changed.emit()
+        report = api.initialisation
         if report != self._report:
             self._report = report
             self.initialisation_changed.emit(report)
-        if not self.api.away and not self._asked:
+        if not api.away and not self._asked:
             self._asked = True
             self._background.do(self._read_scene, self._learn)
 
@@ -143,13 +142,9 @@ class MicoElsewhere(MicoApplicationBase):
         if error is not None:
             self._asked = False  # the next word of the station asks again
             return
-        self.collision.learn(scene)
-        if not self._dressed:
-            self._dressed = True
-            self.teleoperation.close()
-            self.teleoperation = Teleoperation(self.manager, self._policy)
-            if self.collision.available:
-                self.clearance_watch.start()
+        self._scene = scene
+        if scene is not None:
+            self.clearance_watch.start()
         self._known.set()
         self.rescanned.emit()
         self.status_changed.emit()
@@ -161,16 +156,14 @@ class MicoElsewhere(MicoApplicationBase):
             return
         self._closed = True
         self.request_end()
-        self.teleoperation.close()
+        self._end_teleoperation()
         self.recordings.close()
         self.clearance_watch.request_end()
         self.clearance_watch.join()
-        self._end_movements()
         self._link.close()
         self.join()
         self._background.request_end()
         self._background.join()
-        self.manager.close()
 
     # What takes long, at the station
 
