@@ -1,12 +1,13 @@
 """Hostile commands through all ways in at once, judged by an oracle that shares no code.
 
 `python -m benchmarks.adversary --commands 1000000` takes hours and is run at night. Threads of this
-process command axes, groups, jogs, trajectories, detours, forged orders, force limits and control
-loops, and stop everything again and again; a client in a process of its own does the same through
-a station. DAQCo records, ViCo is live. The oracle (tests/oracles/clearance.py, which reads URDF,
-SRDF and scene by itself) follows the true stages and says whether any watched pair came nearer than
-its margin by more than a sensor's step, whether anything moved after a stop, and whether an axis
-left its soft limits. A run that is not harmless ends with exit code 1 and what was seen.
+process command axes, groups, jogs, trajectories, detours, forged orders, force limits, control
+loops, cameras, lens and lamp, and stop everything again and again; a client in a process of its own
+does the same to MiCo and ViCo through a station. DAQCo records, ViCo is live. The oracle
+(tests/oracles/clearance.py, which reads URDF, SRDF and scene by itself) follows the true stages and
+says whether any watched pair came nearer than its margin by more than a sensor's step, whether
+anything moved after a stop, and whether an axis left its soft limits. A run that is not harmless
+ends with exit code 1 and what was seen.
 """
 
 import argparse
@@ -35,6 +36,7 @@ from benchmarks.adversary_attacks import (
     StopSwitch,
     TrajectoryAttack,
 )
+from benchmarks.adversary_images import ImageAttack
 from benchmarks.adversary_watch import Findings, Watch
 from benchmarks.figures import Figure, table
 from cosmic.app.configuration.network import serving
@@ -52,12 +54,14 @@ SCENE = ROOT / "config" / "scenes" / "fiberstation.toml"
 class Result:
     """What a run found."""
 
-    def __init__(self, found: Findings, attacks: Sequence[Attack], remote: tuple[int, list[str]]):
+    def __init__(
+        self, found: Findings, attacks: Sequence[Attack], remote: dict[str, int], raw: list[str]
+    ) -> None:
         self.found = found
-        self.commands = sum(each.calls for each in attacks) + remote[0]
+        self.by_way = {each.name: each.calls for each in attacks} | remote
+        self.commands = sum(self.by_way.values())
         self.refused = sum(each.refused for each in attacks)
-        self.raw = [text for each in attacks for text in each.raw] + remote[1]
-        self.by_way = {each.name: each.calls for each in attacks} | {"station": remote[0]}
+        self.raw = [text for each in attacks for text in each.raw] + raw
 
 
 def _free_port() -> int:
@@ -119,6 +123,7 @@ def attack(
             OrderAttack(rig, seed),
             ForceAttack(rig, seed, Path(folder)),
             TrajectoryAttack(rig, seed),
+            ImageAttack(rig, seed, Path(folder)),
             StopAttack(switch, seed),
         ]
         ended = threading.Event()
@@ -130,33 +135,33 @@ def attack(
 
         threads = [threading.Thread(target=go, args=(each,), name=each.name) for each in attacks]
         watch.start()
-        remote = _Client(endpoint, seed) if client else None
+        remote = _Client(endpoint, seed, folder) if client else None
         for thread in threads:
             thread.start()
-        while sum(each.calls for each in attacks) + (remote.calls if remote else 0) < commands:
+        while sum(each.calls for each in attacks) + (remote.total if remote else 0) < commands:
             if time.monotonic() > end_s:
                 break
             time.sleep(0.05)
         ended.set()
         for thread in threads:
             thread.join()
-        remote_ended = remote.end() if remote is not None else (0, [])
-        if remote is not None and not remote_ended[0]:
-            raise RuntimeError(f"no command went through the station: {remote_ended[1][:3]}")
+        calls, raw = remote.end() if remote is not None else ({}, [])
+        if not all(calls.values()):
+            raise RuntimeError(f"no command went through the station: {calls}, {raw[:3]}")
         watch.may_move()
         watch.end()
-        return Result(watch.found, attacks, remote_ended)
+        return Result(watch.found, attacks, calls, raw)
 
 
 class _Client:
     """A hostile program at another computer."""
 
-    def __init__(self, endpoint: str, seed: int) -> None:
-        command = [sys.executable, "-m", "benchmarks.adversary_client", endpoint, str(seed)]
+    def __init__(self, endpoint: str, seed: int, folder: str) -> None:
+        command = [sys.executable, "-m", "benchmarks.adversary_client", endpoint, str(seed), folder]
         self._process = subprocess.Popen(
             command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
-        self.calls = 0
+        self.calls = {"station": 0, "station, images": 0}
         self._raw: list[str] = []
         self._reader = threading.Thread(target=self._read, name="client's words")
         self._reader.start()
@@ -165,11 +170,16 @@ class _Client:
         assert self._process.stdout is not None
         for line in self._process.stdout:
             if line.startswith("calls "):
-                self.calls = int(line.split()[1])
+                self.calls = dict(zip(self.calls, map(int, line.split()[1:]), strict=True))
             else:
                 self._raw.append(f"station: {line.strip()}")
 
-    def end(self) -> tuple[int, list[str]]:
+    @property
+    def total(self) -> int:
+        """How many commands it has given."""
+        return sum(self.calls.values())
+
+    def end(self) -> tuple[dict[str, int], list[str]]:
         """End it, and return how much it did and what went wrong."""
         assert self._process.stdin is not None
         self._process.stdin.close()
@@ -187,7 +197,8 @@ def figures(result: Result) -> list[Figure]:
     least = found.least.spare_um if found.least is not None else float("nan")
     return [
         Figure(NAME, "hostile commands", result.commands, ""),
-        Figure(NAME, "of these through a station", result.by_way["station"], ""),
+        Figure(NAME, "of these through a station", result.by_way.get("station", 0), ""),
+        Figure(NAME, "to ViCo, here and there", _to_vico(result.by_way), ""),
         Figure(NAME, "looks of the oracle", found.looks, ""),
         Figure(NAME, "pairs nearer than their margin", len(found.too_near), "", 0),
         Figure(NAME, "movements after a stop", len(found.late_stops), "", 0),
@@ -196,6 +207,10 @@ def figures(result: Result) -> list[Figure]:
         Figure(NAME, "raw errors", len(result.raw), "", 0),
         Figure(NAME, "least that a pair had to spare", least, "um"),
     ]
+
+
+def _to_vico(by_way: dict[str, int]) -> int:
+    return sum(calls for way, calls in by_way.items() if "images" in way)
 
 
 def measure(quick: bool = False) -> list[Figure]:

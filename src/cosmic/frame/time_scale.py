@@ -129,9 +129,16 @@ class TimeScale:
             _wake(late)
 
     def now_s(self) -> float:
-        """Return the time."""
-        with self._lock:
+        """Return the time; while another thread brings it up to the wall, what it was before.
+
+        That thread may have to wait for the interpreter, and a stop reads the time.
+        """
+        if not self._lock.acquire(blocking=False):
+            return self._now_s
+        try:
             return self._settle()
+        finally:
+            self._lock.release()
 
     def begin_wait(self, token: object, condition: threading.Condition, until_s: float) -> float:
         """Note that somebody waits for `until_s`; return how long to wait, in wall time.

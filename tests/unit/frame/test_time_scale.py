@@ -266,3 +266,24 @@ def test_what_is_put_into_an_inbox_is_work_until_its_thread_waits_for_more() -> 
     inbox.close()
     assert passes() > 100.0
     leading.close()
+
+
+def test_reading_the_time_waits_for_nobody_who_works_it_out() -> None:
+    inside, go_on = threading.Event(), threading.Event()
+    held_up: list[threading.Thread] = []
+
+    def wall_s() -> float:
+        if threading.current_thread() in held_up:
+            inside.set()
+            assert go_on.wait(20.0)
+        return WALL.now_s()
+
+    time_scale = TimeScale(1.0, wall_s)
+    before_s = time_scale.now_s()
+    held_up.append(threading.Thread(target=time_scale.now_s))
+    held_up[0].start()
+    assert inside.wait(20.0)
+    assert time_scale.now_s() >= before_s  # and comes back
+    go_on.set()
+    held_up[0].join()
+    assert time_scale.now_s() > before_s

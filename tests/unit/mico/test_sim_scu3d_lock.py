@@ -2,14 +2,16 @@
 
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import TracebackType
 
 import numpy as np
 import pytest
-from tests.unit.mico.sim_client import FOR_EVER, Client
+from tests.unit.mico.sim_client import FOR_EVER, STOPPED, Client
 
 from cosmic.frame.clock import ManualClock
-from cosmic.mico.hw import sim_scu3d
+from cosmic.mico.hw import sim_scu3d, sim_scu3d_device
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import shipped_settings
 
@@ -53,7 +55,7 @@ class MeasuredLock:
 @pytest.fixture
 def client(monkeypatch: pytest.MonkeyPatch) -> Client:
     MeasuredLock.made.clear()
-    monkeypatch.setattr(sim_scu3d, "Lock", MeasuredLock)
+    monkeypatch.setattr(sim_scu3d_device, "Lock", MeasuredLock)
     scene = Scene.from_settings(shipped_settings(), ManualClock(auto_advance=True), seed=3)
     return Client(sim_scu3d.load_simulated_library(scene=scene))
 
@@ -127,3 +129,56 @@ def test_movements_that_nobody_looks_at_do_not_pile_up(client: Client) -> None:
         piled.append(side.unseen)
     assert max(piled) < 250
     assert max(piled[150:]) <= 1.2 * max(piled[:150])
+
+
+@contextmanager
+def busy_with(client: Client, name: str) -> Iterator[None]:
+    """Have another thread in the middle of a call, with the lock, as one that is held up."""
+    inside, go_on = threading.Event(), threading.Event()
+
+    def wait(_path: object) -> None:
+        inside.set()
+        assert go_on.wait(20.0)
+
+    stage = client.library.scene.stages[name]
+    before, stage.planned = stage.planned, wait
+    order = (*ADDRESSES[name], 5000, FOR_EVER)
+    thread = threading.Thread(target=client.call, args=("MovePositionAbsolute_A", *order))
+    thread.start()
+    assert inside.wait(20.0)
+    stage.planned = before
+    try:
+        yield
+    finally:
+        go_on.set()
+        thread.join()
+
+
+def test_a_stop_waits_for_no_other_call_and_counts_from_when_it_was_made(client: Client) -> None:
+    client.ok("SetClosedLoopMaxFrequency_A", *ADDRESSES["left.x"], 100)
+    client.ok("MovePositionAbsolute_A", *ADDRESSES["left.x"], 30_000, FOR_EVER)
+    client.advance(1.0)
+    stage = client.library.scene.stages["left.x"]
+    with busy_with(client, "left.y"):
+        at_s = client.clock.now_s()
+        client.ok("Stop_A", *ADDRESSES["left.x"])  # and comes back
+        client.advance(1.0)
+    assert client.status(*ADDRESSES["left.x"]) == STOPPED
+    step_s = 1.0 / 100.0  # the step that was begun is finished
+    assert stage.position(client.clock.now_s()) == pytest.approx(
+        stage.position_then(at_s + step_s), abs=0.01
+    )
+
+
+def test_what_follows_a_stop_finds_it_carried_out(client: Client) -> None:
+    stops = []
+    for number in range(20):
+        client.ok("MovePositionAbsolute_A", *ADDRESSES["left.x"], 100 * number, FOR_EVER)
+        with busy_with(client, "left.y"):
+            client.ok("Stop_A", *ADDRESSES["left.x"])
+            asked = threading.Thread(
+                target=lambda: stops.append(client.status(*ADDRESSES["left.x"]))
+            )
+            asked.start()
+        asked.join()
+    assert stops == [STOPPED] * 20

@@ -5,7 +5,6 @@ the library's own prototypes. The ctypes layer, or any C client, can be pointed 
 """
 
 import logging
-from threading import Lock
 from typing import Any, Final
 
 from cosmic.frame.clock import Clock, RatedClock
@@ -27,7 +26,7 @@ from cosmic.mico.hw.scu3d_ctypes import (
     SA_WRONG_MODE_ERROR,
 )
 from cosmic.mico.hw.sim_scu3d_calls import Body, c_function, section_two
-from cosmic.mico.hw.sim_scu3d_device import Device
+from cosmic.mico.hw.sim_scu3d_device import Device, LibraryLock
 from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
 from cosmic.mico.hw.sim_scu3d_types import Refusal
 from cosmic.twin.scene import Scene
@@ -110,7 +109,7 @@ class SimulatedLibrary:
         self.scene = scene
         self.clock = scene.clock
         self.faults = Faults(self._on_inject, self._on_clear)
-        self._lock = Lock()
+        self._lock = LibraryLock()
         self._wired = [
             Device(number, scene, self.faults, self._lock, newest_error=newest_error)
             for number in scene.devices_of("scu3d")

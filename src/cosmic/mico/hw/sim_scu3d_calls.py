@@ -145,9 +145,12 @@ def _run(
 
 def _asynchronous(session: Session, base: str, operation: Operation) -> Body:
     def body(device_index: int, channel_index: int, *args: int) -> int:
-        if operation.moves and not _stops(base, args):
+        stops = _stops(base, args)
+        if operation.moves and not stops:
             _block(session, device_index, channel_index, asynchronous=True)
         device = session.device(device_index, asynchronous=True)
+        if stops:
+            return _stop_from_now(session, device, channel_index, operation, args)
         with device.changed:
             device = session.device(device_index, asynchronous=True)
             channel = _channel(device, channel_index)
@@ -155,21 +158,41 @@ def _asynchronous(session: Session, base: str, operation: Operation) -> Body:
                 return SA_INVALID_PARAMETER_ERROR
             if device.unplugged:
                 return SA_TRANSMIT_ERROR
-            if device.queue.full and not _stops(base, args):
+            if device.queue.full:
                 return SA_WRITE_ERROR
-            now_s = session.clock.now_s()
-            device.advance(now_s)
-            values, status = _run(operation, channel, now_s, args)
-            if status >= _FIRST_HARDWARE_ERROR:
-                channel.post_error(status, now_s)
-            elif operation.packet:
-                data = operation.data(args, values)
-                device.post((operation.packet, channel_index, *data), now_s)
-            # A listener that waits works out anew what comes next.
-            device.changed.notify_all()
+            _carry_out(operation, device, channel, session.clock.now_s(), args)
             return SA_OK
 
     return body
+
+
+def _stop_from_now(
+    session: Session, device: Device, index: int, operation: Operation, args: tuple[int, ...]
+) -> int:
+    """Stop as of now, though another call be still carried out: who has the lock may be held up."""
+    channel = _channel(device, index)
+    if not operation.fits(*args):
+        return SA_INVALID_PARAMETER_ERROR
+    if device.unplugged:
+        return SA_TRANSMIT_ERROR
+    now_s = session.clock.now_s()
+    device.lock.leave(lambda: _carry_out(operation, device, channel, now_s, args))
+    return SA_OK
+
+
+def _carry_out(
+    operation: Operation, device: Device, channel: Channel, now_s: float, args: tuple[int, ...]
+) -> None:
+    """Carry out an asynchronous command; the library's lock is held."""
+    device.advance(now_s)
+    values, status = _run(operation, channel, now_s, args)
+    if status >= _FIRST_HARDWARE_ERROR:
+        channel.post_error(status, now_s)
+    elif operation.packet:
+        data = operation.data(args, values)
+        device.post((operation.packet, channel.index, *data), now_s)
+    # A listener that waits works out anew what comes next.
+    device.changed.notify_all()
 
 
 def _system_property_bodies(session: Session) -> dict[str, Body]:

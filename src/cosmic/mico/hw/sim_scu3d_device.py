@@ -1,7 +1,10 @@
 """One simulated controller unit: three channels, one queue, one cable."""
 
 import random
+from collections import deque
+from collections.abc import Callable
 from threading import Condition, Lock
+from typing import cast
 
 from cosmic.frame.clock import Clock
 from cosmic.mico.hw.scu3d_ctypes import (
@@ -25,6 +28,53 @@ _ENDS_MOVEMENTS = {
 }
 
 
+class LibraryLock:
+    """The lock of a simulated library, which a stop never waits for; any thread.
+
+    What has to be done with the lock, and is left here while somebody else has it, is done before
+    anybody gets it next: at the latest by whoever has it now, in letting go.
+    """
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._left: deque[Callable[[], object]] = deque()
+
+    def leave(self, work: Callable[[], object]) -> None:
+        """Have `work` done with the lock held, here and now if nobody has it."""
+        self._left.append(work)
+        self._work_off()
+
+    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
+        """Take it, as any lock."""
+        got = self._lock.acquire(blocking, timeout)
+        if got:
+            self._do_what_is_left()
+        return got
+
+    def release(self) -> None:
+        """Let go of it."""
+        self._lock.release()
+        self._work_off()
+
+    def __enter__(self) -> bool:
+        return self.acquire()
+
+    def __exit__(self, *_error: object) -> None:
+        self.release()
+
+    def _work_off(self) -> None:
+        # Again after letting go: what was left in between found the lock taken.
+        while self._left and self._lock.acquire(blocking=False):
+            try:
+                self._do_what_is_left()
+            finally:
+                self._lock.release()
+
+    def _do_what_is_left(self) -> None:
+        while self._left:
+            self._left.popleft()()
+
+
 class Device:
     """One unit as the library sees it; called with the library's lock held.
 
@@ -34,14 +84,14 @@ class Device:
         Its place along the scene's wiring.
     scene : Scene
         What it drives.
-    lock : Lock
+    lock : LibraryLock
         The library's; never held while anything waits.
     newest_error : int
         The last status code that this version of the library knows a name for.
     """
 
     def __init__(
-        self, number: int, scene: Scene, faults: Faults, lock: Lock, *, newest_error: int
+        self, number: int, scene: Scene, faults: Faults, lock: LibraryLock, *, newest_error: int
     ) -> None:
         settings = scene.settings.controller
         self.number = number
@@ -49,7 +99,8 @@ class Device:
         self.settings = settings
         self.faults = faults
         self.newest_error = newest_error
-        self.changed = Condition(lock)
+        self.lock = lock
+        self.changed = Condition(cast("Lock", lock))
         self.queue = PacketQueue(f"simulated SCU {self.serial}", settings.queue_capacity)
         self.asynchronous = False
         self.notification: int | None = None

@@ -5,11 +5,11 @@ that programs of other people can talk to it.
 """
 
 import math
-from threading import Condition, Lock
+from threading import Condition
 from typing import Final
 
 from cosmic.frame.clock import Clock, RatedClock
-from cosmic.mico.hw.sim_scu3d_device import Device
+from cosmic.mico.hw.sim_scu3d_device import Device, LibraryLock
 from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
 from cosmic.mico.hw.sim_scu3d_types import Refusal
 from cosmic.mico.hw.sim_scu_serial_commands import AnsweredError, Settings, carry_out
@@ -45,7 +45,7 @@ class SimulatedUnit:
     """
 
     def __init__(self, number: int, scene: Scene, faults: Faults, baud: int = BAUD) -> None:
-        self.lock = Lock()
+        self.lock = LibraryLock()
         self.clock: Clock = scene.clock
         self._scene = scene
         self._device = Device(number, scene, faults, self.lock, newest_error=255)

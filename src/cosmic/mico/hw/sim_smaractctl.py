@@ -7,11 +7,11 @@ with the library's own prototypes. The ctypes layer, or any C client, can be poi
 import ctypes
 import logging
 from collections.abc import Callable
-from threading import Lock
 from typing import Any, Final
 
 from cosmic.frame.clock import Clock, RatedClock
 from cosmic.mico.hw import smaractctl_ctypes as sa
+from cosmic.mico.hw.sim_scu3d_device import LibraryLock
 from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
 from cosmic.mico.hw.sim_smaractctl_calls import device_functions, text_out
 from cosmic.mico.hw.sim_smaractctl_device import Device
@@ -92,7 +92,7 @@ class SimulatedLibrary:
         self.scene = scene
         self.clock = scene.clock
         self.faults = Faults(self._on_inject, self._on_clear)
-        self._lock = Lock()
+        self._lock = LibraryLock()
         self._wired = [
             Device(number, f"MCS2-{_FIRST_SERIAL + number:08d}", scene, self.faults, self._lock)
             for number in scene.devices_of(MAKE)

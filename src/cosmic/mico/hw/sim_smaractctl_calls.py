@@ -288,7 +288,19 @@ def _movement_functions(session: Session) -> dict[str, Body]:
         return command(handle, transmission, lambda at: at.movement(index, moves.calibrate))
 
     def stop(handle: int, index: int, transmission: int) -> int:
-        return command(handle, transmission, lambda at: at.channel(index).stop)
+        if transmission:
+            return command(handle, transmission, lambda at: at.channel(index).stop)
+        device = _plugged(session, handle)
+        channel, now_s = device.channel(index), session.clock.now_s()
+
+        def carry_out() -> None:
+            device.advance(now_s)
+            device.run(channel.stop, transmission, now_s)
+            device.changed.notify_all()
+
+        # It counts from now, also where another call is still being carried out.
+        device.lock.leave(carry_out)
+        return sa.SA_CTL_ERROR_NONE
 
     return {
         "SA_CTL_Move": move,

@@ -4,13 +4,13 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from threading import Condition, Lock
-from typing import Final
+from typing import Final, cast
 
 from cosmic.frame.clock import Clock
 from cosmic.mico.hw import sim_smaractctl_moves as moves
 from cosmic.mico.hw import sim_smaractctl_properties as properties
 from cosmic.mico.hw import smaractctl_ctypes as sa
-from cosmic.mico.hw.sim_scu3d_device import NOTHING
+from cosmic.mico.hw.sim_scu3d_device import NOTHING, LibraryLock
 from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
 from cosmic.mico.hw.sim_scu3d_queue import PacketQueue
 from cosmic.mico.hw.sim_smaractctl_channel import NOTHING_MOVES, Channel
@@ -67,11 +67,13 @@ class Device:
         Its place along the scene's wiring.
     serial : str
         What is printed on it.
-    lock : Lock
+    lock : LibraryLock
         The library's; never held while anything waits.
     """
 
-    def __init__(self, number: int, serial: str, scene: Scene, faults: Faults, lock: Lock) -> None:
+    def __init__(
+        self, number: int, serial: str, scene: Scene, faults: Faults, lock: LibraryLock
+    ) -> None:
         settings = scene.settings.controller
         self.number = number
         self.serial: str = serial
@@ -79,7 +81,8 @@ class Device:
         self.settings: ControllerSettings = settings
         self.faults = faults
         self.clock: Clock = scene.clock
-        self.changed = Condition(lock)
+        self.lock = lock
+        self.changed = Condition(cast("Lock", lock))
         self.queue = PacketQueue(f"simulated {serial}", settings.queue_capacity)
         self.random = random.Random(f"mcs2 {number} {scene.seed}")
         self.values: dict[int, int] = {}
