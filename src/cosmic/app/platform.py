@@ -21,6 +21,7 @@ from cosmic.app.stations.remote_applications import RemoteApplications, open_sta
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.application import CosmicApplicationBase, GuiFactory
+from cosmic.frame.c_memory import share_one_arena
 from cosmic.frame.clock import Clock, RatedClock
 from cosmic.frame.errors import ArgumentError, ConfigError
 from cosmic.frame.failure import FailurePolicy
@@ -209,6 +210,7 @@ def build_platform(
         A station does not answer.
     """
     share_interpreter()
+    share_one_arena()
     if not tick_finely():
         logger.warning("Windows keeps its timer resolution of 15.6 ms: waits end up to that late")
     file, path = load_platform(config)

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from threading import RLock, get_ident
 from typing import Final
 
+from cosmic.frame.c_memory import give_memory_back
 from cosmic.frame.clock import WALL
 
 logger = logging.getLogger(__name__)
@@ -198,6 +199,8 @@ class Garbage:
         found = gc.collect()
         gc.freeze()
         self._collected_s = self._now_s()
+        if at_rest:
+            give_memory_back()
         self._frozen = left = gc.get_freeze_count()
         if whole:
             self._loaded, self._left_behind = left, False

@@ -4,7 +4,6 @@ Free of Qt: helper processes use it too. Where helpers are started, and how, is 
 `cosmic.frame.helper_process`.
 """
 
-import ctypes
 import faulthandler
 import os
 import signal
@@ -123,30 +122,6 @@ def ending_signals(ended: Callable[[str], object]) -> Generator[None]:
 
 def _hushed(one: signal.Signals) -> bool:
     return one.name == "SIGHUP" and signal.getsignal(one) is signal.SIG_IGN
-
-
-# Memory
-
-
-@cache
-def _malloc_trim() -> Callable[[int], int] | None:
-    if sys.platform != "linux":
-        return None
-    found: Callable[[int], int] | None = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    return found
-
-
-def give_memory_back() -> bool:
-    """Give the system the memory that was freed and is kept for later; False: it is not asked.
-
-    Only glibc has to be asked: it keeps what lies between blocks in use, and each thread has its
-    own. It takes milliseconds, in which who needs memory may wait. Any thread.
-    """
-    trim = _malloc_trim()
-    if trim is None:
-        return False
-    trim(0)
-    return True
 
 
 # Files

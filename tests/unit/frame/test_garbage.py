@@ -227,3 +227,17 @@ def test_of_two_windows_the_last_switches_collection_on_again(bench: Bench) -> N
     assert not gc.isenabled()
     second()
     assert gc.isenabled()
+
+
+def test_freed_memory_goes_back_to_the_system_at_a_rest_and_not_while_something_moves(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: list[bool] = []
+    monkeypatch.setattr(garbage, "give_memory_back", lambda: given.append(bench.moves))
+    bench.moves = True
+    for _ in range(2):
+        kept, _found = old_ring(MOST)
+        kept.clear()
+        assert bench.after(LONGEST_S) is not None
+        bench.moves = False
+    assert given == [False]
