@@ -40,7 +40,7 @@ def test_threads_share_one_arena() -> None:
 
 
 @pytest.mark.parametrize("system", ["win32", "darwin"])
-def test_elsewhere_the_system_decides(system: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_systems_decide_by_themselves(system: str, monkeypatch: pytest.MonkeyPatch) -> None:
     from cosmic.frame import c_memory
 
     c_memory._glibc.cache_clear()
