@@ -1,4 +1,5 @@
-"""STOP and abort in every operation of every shipped procedure: a safe end, and nothing is lost.
+"""STOP in every operation of every shipped procedure, and abort in every second: a safe end, and
+nothing is lost.
 
 The operations are those of the procedures' own trees; one that comes only after something went
 wrong has a row in `PROVOKED`.
@@ -94,8 +95,11 @@ def test_stop_and_abort_in_every_operation_end_it_safely_and_nothing_is_lost(
 ) -> None:
     procedure, way = OPERATIONS[operation]
     trial = Trial(plate, procedure, operation, way)
-    trial.stop(moving=False)
-    trial.abort(moving=True)
+    # By turns, so that each half is tried in every second operation, and each run is shorter.
+    if list(OPERATIONS).index(operation) % 2:
+        trial.abort(moving=True)
+    else:
+        trial.stop(moving=False)
     trial.stop(moving=True)
     trial.finish()
 

@@ -52,6 +52,8 @@ class HeightsAsFiled(FibreOperation):
     @override
     def steps(self, work: HandlingContext) -> Steps:
         work.calibration.up_um.clear()
+        # Where it was looked at, the probe would be in the way of the calibrations that follow.
+        yield from retract_probe(work)
         yield from zoom_to(work, work.settings.zoom)
 
 
