@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from pydantic import BaseModel
 
+from cosmic.app.configuration.gateways import EpicsSettings, HttpClient, HttpSettings
 from cosmic.app.configuration.network import NetworkSettings
 from cosmic.app.configuration.platform_file import PlatformFile, PlatformSettings
 from cosmic.autonomy.control.settings import ControlSettings
@@ -107,6 +108,9 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[vico.light]": LampSettings,
     "[control]": ControlSettings,
     "[network]": NetworkSettings,
+    "[network.http]": HttpSettings,
+    "[[network.http.client]]": HttpClient,
+    "[network.epics]": EpicsSettings,
     "[kinds.NAME]": StageKind,
     "[controller]": ControllerSettings,
     "[[devices]]": DeviceWiring,

@@ -202,6 +202,8 @@ def _add_station_commands(
         help="such as mico,daqco (default: all)",
     )
     serve.add_argument("--seed", type=int, default=0, help="seed of the simulation")
+    serve.add_argument("--http", metavar="ADDRESS", help="serve HTTP there, as 127.0.0.1:8470")
+    serve.add_argument("--epics", metavar="PREFIX", help="serve EPICS records, names after PREFIX")
     commands.add_parser("stations", help="list the stations that were used before")
     made = commands.add_parser("certificates", help="make the certificates of stations and clients")
     made.add_argument("folder", type=Path, metavar="FOLDER")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 
+from cosmic.app.configuration.gateways import doors
 from cosmic.app.configuration.network import Serving, serving
 from cosmic.app.configuration.platform_file import check_applications, load_platform
 from cosmic.app.platform import Platform, Uses, build_platform
@@ -33,6 +34,8 @@ class ServeOptions:
         In place of what the platform file says in ``[network]``.
     stations : tuple of StationAddress
         Others that this one uses, so that a force limit here stops the motion there.
+    http, epics : str or None
+        Where HTTP listens, and what the names of EPICS begin with; in place of what the file says.
     """
 
     applications: tuple[str, ...] = ()
@@ -47,6 +50,8 @@ class ServeOptions:
     sample: str | None = None
     truth: Path | None = None
     world: str | None = None
+    http: str | None = None
+    epics: str | None = None
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -65,6 +70,8 @@ def run(chosen: argparse.Namespace) -> int:
             sample=chosen.sample,
             truth=chosen.truth,
             world=chosen.world,
+            http=chosen.http,
+            epics=chosen.epics,
         )
     )
 
@@ -91,6 +98,7 @@ def serve(options: ServeOptions) -> int:
         name=options.name,
         certificates=options.certificates,
     )
+    opened = doors(file.network.http, file.network.epics, listen=options.http, prefix=options.epics)
     with ExitStack() as at_end:
         at_end.callback(set_up_logging(console=True))
         ended = Event()
@@ -101,9 +109,9 @@ def serve(options: ServeOptions) -> int:
         platform.initialize()
         if platform.failure:
             raise NotConnectedError(platform.failure)
-        host = StationHost(platform, how)
+        host = StationHost(platform, how, opened)
         at_end.callback(host.close)  # first of all, so that nobody is answered any more
-        sys.stdout.write(f"{host.address}\n")
+        sys.stdout.write("\n".join((host.address, *host.gateways, "")))
         sys.stdout.flush()
         ended.wait()
     return 0

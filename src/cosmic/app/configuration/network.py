@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import Field
 
+from cosmic.app.configuration.gateways import EpicsSettings, HttpSettings
 from cosmic.frame.config import StrictModel
 from cosmic.frame.errors import ConfigError, NotAvailable, needs_extra
 from cosmic.frame.network.caller import Access
@@ -32,6 +33,8 @@ class NetworkSettings(StrictModel):
     view: Names = ()
     call: Names = ()
     move: Names = ()
+    http: HttpSettings = HttpSettings()
+    epics: EpicsSettings = EpicsSettings()
 
     @property
     def access(self) -> dict[str, Access]:

@@ -2,9 +2,12 @@
 
 import logging
 from contextlib import ExitStack
+from dataclasses import fields
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from cosmic.app.configuration.gateways import Doors
 from cosmic.app.configuration.network import Serving
+from cosmic.app.gateways.opened import Gateways
 from cosmic.app.platform import Platform
 from cosmic.app.stations.facts import ITSELF, StationFacts, StationSide
 from cosmic.daqco.api.application import DaqcoApplication
@@ -37,15 +40,22 @@ class StationHost:
 
     Only what this process hosts is offered: what it reaches elsewhere is not passed on.
 
+    Parameters
+    ----------
+    doors : Doors
+        What is opened for programs that are not CoSMic.
+
     Raises
     ------
     ConfigError
         There is nothing to offer.
     StationAway
         It cannot listen there.
+    NotAvailable
+        What a door needs is not installed, or it cannot listen there.
     """
 
-    def __init__(self, platform: Platform, how: Serving) -> None:
+    def __init__(self, platform: Platform, how: Serving, doors: Doors | None = None) -> None:
         # Imported here: they need the extra `net`.
         from cosmic.frame.network.server_listener import ServerListener
 
@@ -66,6 +76,10 @@ class StationHost:
             listener = ServerListener(self._station, _opened(how), how.allowed)
             undo.callback(listener.shut_down)
             listener.start()
+            hosts = {name: side for name, side in sides.items() if isinstance(side, Host)}
+            said = {each.name: getattr(facts, each.name) for each in fields(facts)}
+            self._gateways = Gateways(self._station, hosts, said, doors or Doors())
+            undo.callback(self._gateways.close)
             self._undo = undo.pop_all()
         logger.info("%s", self.address)
 
@@ -74,6 +88,11 @@ class StationHost:
         """Its name, what it serves, and where: one line."""
         served = ", ".join(self._applications)
         return f"{self._how.name} serves {served} at {self._how.line.endpoint}"
+
+    @property
+    def gateways(self) -> tuple[str, ...]:
+        """Where programs that are not CoSMic reach it, a line each."""
+        return self._gateways.lines
 
     @property
     def name(self) -> str:

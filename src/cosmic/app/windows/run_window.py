@@ -14,6 +14,7 @@ from PySide6.QtCore import QCoreApplication, QObject, QSettings, QStandardPaths,
 from PySide6.QtWidgets import QApplication
 
 from cosmic.app.configuration.check import key_mistakes
+from cosmic.app.configuration.gateways import doors
 from cosmic.app.configuration.network import serving
 from cosmic.app.configuration.platform_file import KNOWN_APPLICATIONS
 from cosmic.app.platform import Platform, Uses, build_platform
@@ -185,7 +186,7 @@ def _host(options: WindowOptions, platform: Platform) -> StationHost | None:
         name=options.name,
         certificates=options.certificates,
     )
-    return StationHost(platform, how)
+    return StationHost(platform, how, doors(network.http, network.epics))
 
 
 @contextmanager

@@ -157,6 +157,11 @@ class Host:
         self._ends: dict[tuple[str, ...], tuple[Declared, list[Callable[[], None]]]] = {}
         self._overtaken = Overtaken()
 
+    @property
+    def served(self) -> Declared:
+        """The application itself."""
+        return self._served
+
     # What may be called
 
     @property

@@ -1,0 +1,1 @@
+"""Doors for programs that are not CoSMic: HTTP, EPICS. All are users of the declaration."""

@@ -1,0 +1,670 @@
+"""`HttpGateway`: commands, state, images and files of a station over HTTP and WebSocket."""
+
+import asyncio
+import json
+import logging
+import secrets
+import socket
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from hashlib import sha256
+from importlib.resources import files
+from itertools import count
+from typing import Any, Final, TypeVar
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+from typing_extensions import override
+
+from cosmic.app.configuration.gateways import HttpClient, HttpSettings
+from cosmic.app.gateways.catalogue import commands_of
+from cosmic.app.gateways.hub import Hub, Text, Unfollow
+from cosmic.app.gateways.image_files import encoded_image, newest_image, shown_jpeg
+from cosmic.app.gateways.openapi import described
+from cosmic.app.gateways.plain import to_json
+from cosmic.app.gateways.session import Approve, GatewaySession, Order
+from cosmic.daqco.api.daqco import Daqco
+from cosmic.frame.clock import WALL
+from cosmic.frame.declaration import Declared, declaration_of
+from cosmic.frame.errors import CosmicError, MoveRefused, NotAvailable
+from cosmic.frame.job_queue import JobQueue
+from cosmic.frame.network.caller import Access
+from cosmic.frame.network.errors import Busy, CallRefused, RemoteDefect
+from cosmic.frame.network.host import Host
+from cosmic.frame.network.lease import LeaseState
+from cosmic.frame.network.refusals import RefusalCount
+from cosmic.frame.network.station import Station
+from cosmic.frame.operation import Operation
+from cosmic.frame.threads import WorkerThread
+
+logger = logging.getLogger(__name__)
+
+T = TypeVar("T")
+
+BODY_LIMIT_BYTES: Final = 64 * 1024
+MOST_REQUESTS_S: Final = 200.0
+"""So many requests a second of one client are answered; what is more gets 429."""
+MOST_CONNECTIONS: Final = 64
+MOST_WAITING: Final = 32
+"""So many commands wait for one application."""
+LONGEST_WAIT_S: Final = 60.0
+FIRST_WORD_S: Final = 3.0
+BEAT_S: Final = 0.2
+PING_S: Final = 0.4
+MOST_OPERATIONS: Final = 256
+SLOWED_AFTER: Final = 20
+_BACKLOG: Final = 256
+
+
+class HttpError(Exception):
+    """An answer that is an error.
+
+    Parameters
+    ----------
+    status : int
+        Of HTTP.
+    """
+
+    def __init__(self, status: int, text: str) -> None:
+        super().__init__(text)
+        self.status = status
+
+
+@dataclass
+class _User:
+    """A client that is known by its token, with its session."""
+
+    settings: HttpClient
+    session: GatewaySession
+    operations: dict[str, Operation[Any]] = field(default_factory=dict)
+    numbers: "count[int]" = field(default_factory=lambda: count(1))
+    lines: int = 0
+    tokens: float = MOST_REQUESTS_S
+    looked_s: float = 0.0
+    heard_s: float = 0.0
+
+    def keep(self, operation: Operation[Any]) -> str:
+        """Keep an operation under a number."""
+        number = str(next(self.numbers))
+        self.operations[number] = operation
+        for old in [each for each, one in self.operations.items() if one.done]:
+            if len(self.operations) > MOST_OPERATIONS:
+                del self.operations[old]
+        return number
+
+    def admit(self, now_s: float) -> bool:
+        """Take note of a request; False where there were too many."""
+        self.tokens = min(MOST_REQUESTS_S, self.tokens + (now_s - self.looked_s) * MOST_REQUESTS_S)
+        self.looked_s = now_s
+        if self.tokens < 1.0:
+            return False
+        self.tokens -= 1.0
+        return True
+
+
+class HttpGateway:
+    """A station over HTTP; `close` it in every case.
+
+    Parameters
+    ----------
+    hosts : mapping of str to Host
+        The declared applications.
+    facts : mapping
+        What the station says of itself.
+
+    Raises
+    ------
+    NotAvailable
+        It cannot listen there.
+    """
+
+    def __init__(
+        self,
+        station: Station,
+        hosts: Mapping[str, Host],
+        settings: HttpSettings,
+        facts: Mapping[str, object],
+        approve: Approve | None = None,
+    ) -> None:
+        self._station = station
+        self._hosts = dict(hosts)
+        self._facts = dict(facts)
+        self._settings = settings
+        kinds: dict[str, type[Declared]] = {name: type(each.served) for name, each in hosts.items()}
+        self._hub = Hub(station, kinds)
+        self._openapi = described(kinds)
+        self._waiting_s = {
+            (name, each.function): each.declared.need.timeout_s
+            for name, kind in kinds.items()
+            for each in commands_of(name, kind)
+        }
+        self._approve = approve if settings.approve else None
+        self._users = {
+            sha256(each.token.encode()).digest(): self._user(each) for each in settings.client
+        }
+        self._refusals = RefusalCount(WALL)
+        self._queues = {
+            name: JobQueue(f"{name} over HTTP", station.policy) for name in (*hosts, "", "stops")
+        }
+        self._socket = _listening(settings)
+        self._server = _Server(self._application(), self._socket, settings, station)
+        self._server.start()
+
+    @property
+    def address(self) -> str:
+        """Where it is reached."""
+        host, port = self._socket.getsockname()[:2]
+        shown = f"[{host}]" if ":" in host else host
+        return f"{'https' if self._settings.certificate else 'http'}://{shown}:{port}"
+
+    def close(self) -> None:
+        """Stop what clients have set in motion and answer no more; any state."""
+        for user in self._users.values():
+            user.session.close("the HTTP gateway closes")
+        self._server.request_end()
+        self._server.join()
+        self._hub.close()
+        for queue in self._queues.values():
+            queue.request_end()
+            queue.join()
+
+    def _user(self, settings: HttpClient) -> _User:
+        access = Access[settings.access.upper()]
+        session = GatewaySession(self._station, settings.name, access, self._approve)
+        return _User(settings, session)
+
+    def _application(self) -> Starlette:
+        def route(path: str, answer: Callable[..., Any], *methods: str) -> Route:
+            return Route(path, self._guarded(answer), methods=list(methods))
+
+        return Starlette(
+            routes=[
+                Route("/", self._page, methods=["GET"]),
+                Route("/openapi.json", self._description, methods=["GET"]),
+                route("/api/station", self._about, "GET"),
+                route("/api/control", self._control, "POST", "DELETE"),
+                route("/api/operations/{number}", self._operation, "GET", "DELETE"),
+                route("/api/images/{camera}", self._image, "GET"),
+                route("/api/files", self._files, "GET"),
+                route("/api/files/{name}", self._file, "GET"),
+                WebSocketRoute("/api/events", self._events),
+                route("/api/{application}/{path:path}", self._state, "GET"),
+                route("/api/{application}/{path:path}", self._command, "POST"),
+            ]
+        )
+
+    # Who asks
+
+    def _guarded(self, answer: Callable[..., Any]) -> Callable[[Request], Any]:
+        async def guarded(request: Request) -> Response:
+            try:
+                user = await self._known(request)
+                found: Response = await answer(request, user)
+                return found
+            except HttpError as exc:
+                return _refusal(exc.status, "HttpError", str(exc))
+            except CosmicError as exc:
+                return _told(exc)
+            except ClientDisconnect:
+                return Response(status_code=400)
+            except Exception as exc:  # noqa: BLE001 - a defect: told, and the others go on
+                failure = self._station.policy.report(exc, f"HTTP {request.url.path[:100]}")
+                return _refusal(500, "RemoteDefect", failure.text)
+
+        return guarded
+
+    async def _known(self, request: Request) -> _User:
+        kind, _, token = request.headers.get("authorization", "").partition(" ")
+        user = self._user_of(token.strip()) if kind.lower() == "bearer" else None
+        where = request.client.host if request.client else "?"
+        if user is None:
+            if self._refusals.note(where) > SLOWED_AFTER:
+                await asyncio.sleep(1.0)
+            raise HttpError(401, "send the header Authorization: Bearer TOKEN")
+        now_s = WALL.now_s()
+        user.heard_s = now_s
+        user.session.beat()
+        if not user.admit(now_s):
+            raise HttpError(429, f"more than {MOST_REQUESTS_S:g} requests a second")
+        return user
+
+    def _user_of(self, token: str) -> _User | None:
+        found = self._users.get(sha256(token.encode("utf-8", "replace")).digest())
+        if found is None or not secrets.compare_digest(
+            found.settings.token.encode(), token.encode("utf-8", "replace")
+        ):
+            return None
+        return found
+
+    # What anybody may see
+
+    async def _page(self, _request: Request) -> Response:
+        text = files("cosmic.app.gateways").joinpath("page.html").read_text(encoding="utf-8")
+        return HTMLResponse(text, headers={"Content-Security-Policy": _POLICY})
+
+    async def _description(self, _request: Request) -> Response:
+        return JSONResponse(self._openapi)
+
+    # Station, control, operations
+
+    async def _about(self, _request: Request, user: _User) -> Response:
+        return JSONResponse(
+            {
+                "station": self._station.name,
+                **{name: to_json(value) for name, value in self._facts.items()},
+                "you": user.settings.name,
+                "access": user.settings.access,
+                "in_control": user.session.in_control,
+                "control": to_json(self._station.lease.state),
+            }
+        )
+
+    async def _control(self, request: Request, user: _User) -> Response:
+        take = request.method == "POST"
+        await self._job(
+            "stops", user.session.take_control if take else user.session.release_control, "control"
+        )
+        state: LeaseState = self._station.lease.state
+        return JSONResponse({"in_control": user.session.in_control, "control": to_json(state)})
+
+    async def _operation(self, request: Request, user: _User) -> Response:
+        number = request.path_params["number"]
+        found = user.operations.get(number)
+        if found is None:
+            raise HttpError(404, f"there is no operation {number[:20]!r}")
+        if request.method == "DELETE":
+            found.cancel()
+        return await self._going_on(request, user, number, found)
+
+    async def _going_on(
+        self, request: Request, user: _User, number: str, operation: Operation[Any]
+    ) -> Response:
+        await self._watched(request, user, operation, _seconds(request, "wait", 0.0))
+        if not operation.done:
+            progress = operation.progress
+            shown = {
+                "operation": number,
+                "title": progress.title,
+                "done": False,
+                "fraction": progress.fraction,
+                "text": progress.text,
+            }
+            return JSONResponse(shown, 202)
+        failure = operation.failure
+        if failure is not None:
+            return _told(failure)
+        result = to_json(operation.result)
+        return JSONResponse({"operation": number, "done": True, "result": result})
+
+    async def _watched(
+        self, request: Request, user: _User, operation: Operation[Any], wait_s: float
+    ) -> None:
+        """Wait for an operation; who waits is alive, and one that hangs up stops it."""
+        until_s = WALL.now_s() + wait_s
+        while not operation.done and WALL.now_s() < until_s:
+            left_s = min(BEAT_S, until_s - WALL.now_s())
+            await _ended(operation, max(left_s, 0.001))
+            if await request.is_disconnected():
+                operation.cancel()
+                raise HttpError(400, "hung up")
+            user.session.beat()
+
+    # Commands and state
+
+    async def _command(self, request: Request, user: _User) -> Response:
+        application = request.path_params["application"]
+        function, keys = self._address(application, request.path_params["path"])
+        arguments = await _body(request)
+        order = user.session.order(application, function, arguments, keys)
+        queue = "stops" if order.found.mark.at_once else application
+        result = await self._carried_out(request, user, order, queue)
+        if isinstance(result, Operation):
+            return await self._going_on(request, user, user.keep(result), result)
+        return JSONResponse({"result": to_json(result)})
+
+    async def _carried_out(self, request: Request, user: _User, order: Order, queue: str) -> object:
+        if queue != "stops" and self._queues[queue].waiting >= MOST_WAITING:
+            raise Busy(f"too many commands wait for {queue}")
+        job = self._queues[queue].submit(lambda: user.session.carry_out(order), order.title)
+        wait_s = self._waiting_s.get((order.application, order.found.name), LONGEST_WAIT_S)
+        await self._watched(request, user, job, max(wait_s, 2.0))
+        if not job.done:
+            raise Busy(f"{order.title} takes longer than {wait_s:g} s")
+        return job.result
+
+    def _address(self, application: str, path: str) -> tuple[str, tuple[str, ...]]:
+        """Return the function and the keys that a path names."""
+        host = self._host(application)
+        parts, keys, left = [], [], [each for each in path.split("/") if each]
+        kind = type(host.served)
+        while len(left) > 1:
+            inner, keyed = _part(kind, left[0])
+            parts.append(left.pop(0))
+            if keyed:
+                keys.append(left.pop(0))
+            kind = inner
+        if not left:
+            raise HttpError(404, "name a command at the end of the path")
+        return ".".join((*parts, left[0])), tuple(keys)
+
+    def _host(self, application: str) -> Host:
+        found = self._hosts.get(application)
+        if found is None:
+            there = ", ".join(self._hosts)
+            raise HttpError(404, f"there is no {application[:40]!r} here; there are {there}")
+        return found
+
+    async def _state(self, request: Request, user: _User) -> Response:
+        del user
+        host = self._host(request.path_params["application"])
+        steps = [each for each in request.path_params["path"].split("/") if each]
+        if not steps or steps[0] != "state":
+            raise HttpError(404, "state stands under state; commands are sent with POST")
+        values: Any = (await self._job("", host.state, "state")).values
+        for step in steps[1:]:
+            values = values if isinstance(values, dict) else to_json(values)
+            if not isinstance(values, dict) or step not in values:
+                raise HttpError(404, f"there is no {step[:40]!r} in the state")
+            values = values[step]
+        return JSONResponse(to_json(values))
+
+    async def _job(self, queue: str, action: Callable[[], T], title: str) -> T:
+        if self._queues[queue].waiting >= 4 * MOST_WAITING:
+            raise Busy("too many requests wait")
+        job = self._queues[queue].submit(action, title)
+        until_s = WALL.now_s() + 10.0
+        while not job.done and WALL.now_s() < until_s:
+            await _ended(job, 1.0)
+        return job.result
+
+    # Images and files
+
+    async def _image(self, request: Request, user: _User) -> Response:
+        camera, _, ending = request.path_params["camera"].rpartition(".")
+        if ending not in ("png", "tif", "jpg"):
+            raise HttpError(404, "the name of an image ends in .png, .tif or .jpg")
+
+        def made() -> bytes:
+            image = newest_image(user.session, camera)
+            return encoded_image(image, ending)
+
+        coded = await self._job("", made, "an image")
+        kinds = {"png": "image/png", "tif": "image/tiff", "jpg": "image/jpeg"}
+        return Response(coded, media_type=kinds[ending], headers={"Cache-Control": "no-store"})
+
+    async def _files(self, _request: Request, user: _User) -> Response:
+        del user
+        daqco = self._daqco()
+        found = await self._job("", lambda: daqco.recordings(daqco.directory), "files")
+        return JSONResponse([{"name": each.name} for each in found])
+
+    async def _file(self, request: Request, user: _User) -> Response:
+        del user
+        daqco, name = self._daqco(), request.path_params["name"]
+        found = await self._job("", lambda: daqco.recordings(daqco.directory), "files")
+        for each in found:
+            if each.name == name:
+                return FileResponse(each, filename=name)
+        raise HttpError(404, f"there is no recording {name[:60]!r}")
+
+    def _daqco(self) -> Daqco:
+        found = self._host("daqco").served
+        if not isinstance(found, Daqco):
+            raise HttpError(404, "no recordings here")
+        return found
+
+    # Events
+
+    async def _events(self, socket_: WebSocket) -> None:
+        await socket_.accept()
+        line = _Line(socket_)
+        user: _User | None = None
+        ends: list[Unfollow] = []
+        try:
+            first = await asyncio.wait_for(_word(socket_), FIRST_WORD_S)
+            user = self._user_of(str(first.get("token", "")))
+            if user is None:
+                await socket_.close(4401, 'the first message is {"token": ...}')
+                return
+            user.lines += 1
+            await line.send(json.dumps({"topic": "hello", "payload": user.settings.name}))
+            sending = asyncio.create_task(line.run(user.session.beat))
+            try:
+                await self._follow(first, line, ends)
+                while True:
+                    await self._follow(await _word(socket_), line, ends)
+            finally:
+                sending.cancel()
+                with suppress(asyncio.CancelledError):
+                    await sending
+        except (WebSocketDisconnect, TimeoutError, RuntimeError):
+            pass  # gone, or never said who it is
+        except HttpError as exc:
+            with suppress(RuntimeError, WebSocketDisconnect):
+                await socket_.close(4400, str(exc)[:100])
+        finally:
+            for each in ends:
+                await self._job("", each, "unfollow")
+            self._hung_up(user)
+
+    def _hung_up(self, user: _User | None) -> None:
+        if user is None:
+            return
+        user.lines -= 1
+        if user.lines == 0:
+            user.session.lose_motion(f"{user.settings.name} hung up")
+
+    async def _follow(self, word: Mapping[str, Any], line: "_Line", ends: list[Unfollow]) -> None:
+        wanted = word.get("follow", [])
+        if not isinstance(wanted, list) or len(wanted) > 32 or len(ends) > 64:
+            raise HttpError(400, "follow: a list of up to 32 topics")
+        for topic in wanted:
+            encode = None
+            if isinstance(topic, str) and topic.endswith("/shown"):
+                encode = shown_jpeg
+            try:
+                ends.append(self._hub.follow(str(topic), line.put, encode))
+            except KeyError:
+                raise HttpError(400, f"there is no topic {str(topic)[:60]!r}") from None
+
+
+class _Line:
+    """What waits to be sent to one WebSocket: the newest of each topic, or each of a few."""
+
+    def __init__(self, socket_: WebSocket) -> None:
+        self._socket = socket_
+        self._loop = asyncio.get_running_loop()
+        self._woken = asyncio.Event()
+        self._newest: dict[str, Text] = {}
+        self._all: list[Text] = []
+        self._lost = 0
+
+    def put(self, topic: str, each: bool, text: Text) -> None:
+        """Have it sent; any thread, returns at once."""
+        with suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self._put, topic, each, text)
+
+    def _put(self, topic: str, each: bool, text: Text) -> None:
+        if not each:
+            self._newest[topic] = text
+        elif len(self._all) < _BACKLOG:
+            self._all.append(text)
+        else:
+            self._lost += 1
+        self._woken.set()
+
+    async def run(self, beat: Callable[[], None]) -> None:
+        """Send what comes, until cancelled; `beat` is called while the line stands."""
+        while True:
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._woken.wait(), BEAT_S)
+            beat()
+            self._woken.clear()
+            waiting, self._all = self._all, []
+            newest, self._newest = self._newest, {}
+            if self._lost:
+                waiting.append(json.dumps({"topic": "lost", "payload": self._lost}))
+                self._lost = 0
+            for text in (*waiting, *newest.values()):
+                await self.send(text)
+
+    async def send(self, text: Text) -> None:
+        """Send one message."""
+        if isinstance(text, bytes):
+            await self._socket.send_bytes(text)
+        else:
+            await self._socket.send_text(text)
+
+
+class _Server(WorkerThread):
+    def __init__(
+        self, application: Starlette, bound: socket.socket, settings: HttpSettings, station: Station
+    ) -> None:
+        super().__init__(f"{station.name} over HTTP", station.policy)
+        self._bound = bound
+        self._lease = station.lease
+        self._server = uvicorn.Server(
+            uvicorn.Config(
+                application,
+                log_config=None,
+                access_log=False,
+                lifespan="off",
+                http="h11",
+                ws="websockets-sansio",
+                ws_max_size=BODY_LIMIT_BYTES,
+                ws_ping_interval=PING_S,
+                ws_ping_timeout=PING_S,
+                limit_concurrency=MOST_CONNECTIONS,
+                timeout_keep_alive=5,
+                timeout_graceful_shutdown=1,
+                h11_max_incomplete_event_size=16 * 1024,
+                server_header=False,
+                ssl_certfile=settings.certificate or None,
+                ssl_keyfile=settings.key or None,
+            )
+        )
+
+    @override
+    def run_body(self) -> None:
+        asyncio.run(self._serve())
+
+    async def _serve(self) -> None:
+        watching = asyncio.create_task(self._watch())
+        try:
+            await self._server.serve(sockets=[self._bound])
+        finally:
+            watching.cancel()
+
+    async def _watch(self) -> None:
+        """Let the right to move lapse of whoever fell silent."""
+        while True:
+            await asyncio.sleep(BEAT_S)
+            self._lease.poll()
+
+    @override
+    def request_end(self) -> None:
+        super().request_end()
+        self._server.should_exit = True
+
+
+_POLICY: Final = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src blob:; connect-src 'self' ws: wss:; frame-ancestors 'none'"
+)
+
+
+def _listening(settings: HttpSettings) -> socket.socket:
+    host, port = settings.where
+    try:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        made = socket.socket(family, socket.SOCK_STREAM)
+        try:
+            made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            made.bind((host, port))
+            made.listen(MOST_CONNECTIONS)  # from now on who comes is answered, if a little later
+        except OSError:
+            made.close()
+            raise
+    except OSError as exc:
+        raise NotAvailable(
+            f"HTTP cannot listen at {settings.listen}: {exc.strerror or exc}; choose another "
+            "address with --http"
+        ) from exc
+    return made
+
+
+def _part(kind: type[Declared], name: str) -> tuple[type[Declared], bool]:
+    found = declaration_of(kind).parts.get(name)
+    if found is None:
+        there = ", ".join(declaration_of(kind).parts) or "none"
+        raise HttpError(404, f"there is no part {name[:40]!r}; there are {there}")
+    return found.kind, found.keyed
+
+
+async def _ended(operation: Operation[Any], wait_s: float) -> None:
+    """Wait until an operation has ended, at most so long; it goes on whoever is cancelled."""
+    loop, ended = asyncio.get_running_loop(), asyncio.Event()
+
+    def wake(_operation: object) -> None:
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(ended.set)
+
+    operation.add_callback(wake)
+    with suppress(TimeoutError):
+        await asyncio.wait_for(ended.wait(), wait_s)
+
+
+async def _body(request: Request) -> dict[str, Any]:
+    said = bytearray()
+    async for piece in request.stream():
+        said += piece
+        if len(said) > BODY_LIMIT_BYTES:
+            raise HttpError(413, f"a command has at most {BODY_LIMIT_BYTES} bytes")
+    return _object(bytes(said) or b"{}")
+
+
+async def _word(socket_: WebSocket) -> dict[str, Any]:
+    return _object((await socket_.receive_text()).encode())
+
+
+def _object(said: bytes) -> dict[str, Any]:
+    try:
+        found = json.loads(said)
+    except (ValueError, RecursionError) as exc:
+        raise HttpError(400, f"what came is no JSON: {str(exc)[:100]}") from exc
+    if not isinstance(found, dict):
+        raise HttpError(400, "arguments are a JSON object, by their names")
+    return found
+
+
+def _seconds(request: Request, name: str, default: float) -> float:
+    text = request.query_params.get(name)
+    try:
+        value = default if text is None else float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0.0 <= value <= LONGEST_WAIT_S:
+        raise HttpError(400, f"{name}: a number of seconds up to {LONGEST_WAIT_S:g}")
+    return value
+
+
+_STATUS: Final = ((MoveRefused, 409), (Busy, 503), (CallRefused, 400), (RemoteDefect, 500))
+
+
+def _told(error: Exception) -> Response:
+    status = next((code for kind, code in _STATUS if isinstance(error, kind)), 422)
+    verdict = to_json(error.verdict) if isinstance(error, MoveRefused) else None
+    return _refusal(status, type(error).__name__, str(error), verdict)
+
+
+def _refusal(status: int, kind: str, text: str, verdict: object = None) -> Response:
+    error: dict[str, object] = {"kind": kind, "text": text[:2000]}
+    if verdict is not None:
+        error["verdict"] = verdict
+    headers = {"WWW-Authenticate": "Bearer"} if status == 401 else None
+    return JSONResponse({"error": error}, status, headers)

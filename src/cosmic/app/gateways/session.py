@@ -1,0 +1,214 @@
+"""`GatewaySession`: one program that uses a station through a gateway of this process."""
+
+import logging
+import secrets
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import count
+from threading import Lock
+from typing import Any, Final
+
+from cosmic.app.gateways.plain import from_json
+from cosmic.frame.network.caller import Access, Caller
+from cosmic.frame.network.errors import CallRefused
+from cosmic.frame.network.host import KEYS, NUMBER
+from cosmic.frame.network.lease import LeaseState
+from cosmic.frame.network.ongoing import Answered, Ended, Ticket, Tickets
+from cosmic.frame.network.remote import Offered
+from cosmic.frame.network.station import Station
+from cosmic.frame.network.travelling_errors import from_plain
+from cosmic.frame.operation import Operation, Progress
+
+logger = logging.getLogger(__name__)
+
+_MOST_KEPT: Final = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """A command as it came, checked and numbered, not yet carried out."""
+
+    application: str
+    found: Offered
+    arguments: Mapping[str, object]
+
+    @property
+    def title(self) -> str:
+        """What it is, for messages."""
+        return f"{self.application}.{self.found.name}"
+
+
+Approve = Callable[[str, Order, Callable[[], object]], object]
+"""`approve(who, order, carry_out)` returns what to answer with: often an operation that waits."""
+
+
+class GatewaySession:
+    """What one program commands through a gateway, and what goes on for it; any thread.
+
+    It commands as a client of the station does: through the lease, the gate and the checks of the
+    invoker. `close` it in every case: what it moves stops then.
+
+    Parameters
+    ----------
+    name : str
+        What log and windows show.
+    approve : callable or None
+        Asked before a command that moves is carried out.
+    """
+
+    def __init__(
+        self, station: Station, name: str, access: Access, approve: Approve | None = None
+    ) -> None:
+        self._station = station
+        self._caller = Caller(name, secrets.token_hex(16), access)
+        self._approve = approve
+        self._numbers = count(1)
+        self._lock = Lock()
+        self._operations: OrderedDict[str, Operation[Any]] = OrderedDict()
+        self._tickets = Tickets(self._on_event)
+        self._forget = station.lease.subscribe(self._on_lease)
+
+    @property
+    def name(self) -> str:
+        """What log and windows show."""
+        return self._caller.name
+
+    @property
+    def in_control(self) -> bool:
+        """It holds the right to move."""
+        return self._station.lease.holds(self._caller.token)
+
+    def take_control(self, *, in_process: bool = False) -> None:
+        """Take the right to move, or keep it.
+
+        Parameters
+        ----------
+        in_process : bool
+            Whoever calls sees to it by itself that the program is alive.
+
+        Raises
+        ------
+        MoveRefused
+            Another holds it (`NO_LEASE`).
+        CallRefused
+            This program may not move anything.
+        """
+        if self._caller.access < Access.MOVE:
+            raise CallRefused(f"{self.name} may not move anything")
+        self._station.lease.take(self.name, self._caller.token, in_process=in_process)
+        self.beat()
+
+    def release_control(self) -> None:
+        """Give the right to move back; what moves by it stops."""
+        self._tickets.cancel_motion()
+        self._station.lease.release(self._caller.token)
+
+    def beat(self) -> None:
+        """Note a sign of life of the program."""
+        self._station.lease.beat(self._caller.token, self._station.clock.now_s())
+
+    def lose_motion(self, why: str) -> None:
+        """End what it moves and take the right to move from it."""
+        self._station.lease.release(self._caller.token, why)
+        self._tickets.cancel_motion()
+
+    def close(self, why: str = "its gateway closes") -> None:
+        """End the session; what it moves stops. Harmless the second time."""
+        self.lose_motion(why)
+        self._forget()
+
+    # Commands
+
+    def order(
+        self,
+        application: str,
+        function: str,
+        arguments: Mapping[str, object],
+        keys: tuple[str, ...] = (),
+    ) -> Order:
+        """Return a command, its arguments made of JSON; a later halt makes it void.
+
+        Parameters
+        ----------
+        keys : tuple of str
+            Of the parts with keys on the way to the command.
+
+        Raises
+        ------
+        CallRefused
+            There is no such command, it may not be given, or an argument is not of its kind.
+        """
+        found = self._station.invoker(application).find(self._caller, function)
+        known = {name: kind for name, kind in found.parameters.items() if name[0] not in "@#"}
+        given: dict[str, object] = {}
+        for name, value in arguments.items():
+            if name not in known:
+                raise CallRefused(
+                    f"{function} takes {', '.join(known) or 'nothing'}, not {str(name)[:60]!r}"
+                )
+            try:
+                given[name] = from_json(value, known[name])
+            except CallRefused as exc:
+                raise CallRefused(f"{function}: {name}: {exc}") from exc
+        if KEYS in found.parameters:
+            given[KEYS] = keys
+        if NUMBER in found.parameters:
+            given[NUMBER] = next(self._numbers)
+        return Order(application, found, found.checked(given))
+
+    def carry_out(self, order: Order) -> object:
+        """Carry a command out and return its result; an `Operation` where it goes on.
+
+        Raises
+        ------
+        CosmicError
+            What the command raised, or why it was refused.
+        """
+        mark = order.found.mark
+        if self._approve is not None and mark.moves and not mark.at_once:
+            return self._approve(self.name, order, lambda: self._invoke(order))
+        return self._invoke(order)
+
+    def _invoke(self, order: Order) -> object:
+        invoker = self._station.invoker(order.application)
+        result = invoker.invoke(self._caller, order.found.name, order.arguments)
+        wrapped = self._tickets.wrap(result, moves=order.found.mark.moves)
+        answer = wrapped.result if isinstance(wrapped, Answered) else wrapped
+        if isinstance(answer, Ticket):
+            return self._followed(answer.number, answer.title)
+        return answer
+
+    def _followed(self, number: str, title: str = "") -> Operation[Any]:
+        """Return what stands for something that goes on; the first to ask makes it."""
+        with self._lock:
+            found = self._operations.get(number)
+            if found is None:
+                found = self._operations[number] = Operation(title or "a command")
+                found.on_cancel(lambda: self._tickets.cancel(number))
+                for old in [each for each, one in self._operations.items() if one.done]:
+                    if len(self._operations) > _MOST_KEPT:
+                        del self._operations[old]
+        return found
+
+    def _on_event(self, event: list[object]) -> None:
+        number, progress, done, result, error = event
+        followed = self._followed(str(number))
+        if not done:
+            if isinstance(progress, Progress):
+                followed.report(progress.fraction, progress.text)
+        elif isinstance(result, Ended):
+            self._end(followed, result.result, result.error)
+        else:
+            self._end(followed, result, error)
+
+    @staticmethod
+    def _end(followed: Operation[Any], result: object, error: object) -> None:
+        if error is None:
+            followed.finish(result)
+        else:
+            followed.fail(from_plain(error))
+
+    def _on_lease(self, _state: LeaseState) -> None:
+        if not self.in_control:
+            self._tickets.cancel_motion()

@@ -1,0 +1,286 @@
+"""HTTP: what is declared is commanded, read and followed, through the lease and the checks."""
+
+import asyncio
+import json
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import Any
+
+import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from contract.station_rig import free_port, wait_until
+from contract.test_declaration import Cabinet, WithBell
+from cosmic.app.configuration.gateways import HttpClient, HttpSettings, doors
+from cosmic.app.gateways.http import BODY_LIMIT_BYTES, HttpGateway
+from cosmic.app.gateways.openapi import mcp_tools
+from cosmic.frame.errors import ConfigError
+from cosmic.frame.failure import Failure, FailurePolicy
+from cosmic.frame.network.host import Host
+from cosmic.frame.network.station import Station
+
+TOKENS = {"move": "m" * 20, "call": "c" * 20, "view": "v" * 20}
+
+
+@dataclass
+class Door:
+    home: Cabinet
+    station: Station
+    address: str
+    failures: list[Failure]
+
+    def client(self, access: str = "move", **more: Any) -> httpx.Client:
+        headers = {"Authorization": f"Bearer {TOKENS[access]}"}
+        return httpx.Client(base_url=self.address, headers=headers, timeout=20.0, **more)
+
+    @contextmanager
+    def line(self, access: str = "move", follow: tuple[str, ...] = ()) -> Iterator[Any]:
+        with connect(self.address.replace("http", "ws") + "/api/events", proxy=None) as made:
+            made.send(json.dumps({"token": TOKENS[access], "follow": list(follow)}))
+            assert json.loads(made.recv(5.0))["topic"] == "hello"
+            yield made
+
+
+@contextmanager
+def opened(kind: type[Cabinet] = Cabinet) -> Iterator[Door]:
+    home, policy = kind(), FailurePolicy()
+    failures: list[Failure] = []
+    policy.subscribe(failures.append)
+    station = Station("fibres", policy)
+    host = Host("cabinet", home)
+    station.host("cabinet", host)
+    clients = tuple(
+        HttpClient.model_validate({"name": each, "token": token, "access": each})
+        for each, token in TOKENS.items()
+    )
+    settings = HttpSettings(listen=f"127.0.0.1:{free_port()}", client=clients)
+    gateway = HttpGateway(station, {"cabinet": host}, settings, {"platform": "test"})
+    try:
+        yield Door(home, station, gateway.address, failures)
+    finally:
+        gateway.close()
+        host.close()
+
+
+@pytest.fixture
+def door() -> Iterator[Door]:
+    with opened() as made:
+        yield made
+
+
+def test_a_command_declared_tomorrow_is_there_without_a_line_of_code() -> None:
+    with opened(WithBell) as door, door.client("call") as http:
+        assert http.post("/api/cabinet/ring", json={"times": 2}).json() == {"result": "ding ding "}
+        assert door.home.rung == [2]
+        described = http.get("/openapi.json").json()["paths"]["/api/cabinet/ring"]["post"]
+        body = described["requestBody"]["content"]["application/json"]["schema"]
+        assert body["properties"]["times"] == {"type": "integer", "default": 1}
+    tool = {each["name"]: each for each in mcp_tools({"cabinet": WithBell})}["cabinet_ring"]
+    assert tool["inputSchema"]["properties"]["times"]["type"] == "integer"
+
+
+def test_what_moves_needs_the_right_and_goes_through_the_lease(door: Door) -> None:
+    with door.client() as http:
+        path = "/api/cabinet/drawers/left.x/move"
+        refused = http.post(path, json={"target_um": 5.0})
+        assert refused.status_code == 409
+        assert refused.json()["error"]["verdict"]["reason"] == "NO_LEASE"
+        assert http.post("/api/control").json()["control"]["holder"] == "move"
+        assert http.post(path, json={"target_um": 5}).json() == {"result": 5.0}
+        assert door.home.drawers["left.x"].moved_um == [5.0]
+        assert http.get("/api/cabinet/state/drawers/left.x/position_um").json() == 5.0
+        http.delete("/api/control")
+        assert door.station.lease.state.local
+
+
+def test_settings_and_words_come_as_json(door: Door) -> None:
+    with door.client("call") as http:
+        settings = {"name": "new", "brightest": 2.0}
+        assert http.post("/api/cabinet/apply", json={"settings": settings}).is_success
+        assert http.get("/api/cabinet/state/settings").json() == settings
+        http.post("/api/cabinet/lamp/shine", json={"colour": "green", "level": 0.5})
+        assert http.get("/api/cabinet/state/lamp/shown").json() == {"colour": "green", "level": 0.5}
+        bright = http.post("/api/cabinet/apply", json={"settings": {"name": "x", "brightest": 11}})
+        assert (bright.status_code, bright.json()["error"]["text"]) == (422, "too bright")
+
+
+def test_what_goes_on_is_followed_and_ended(door: Door) -> None:
+    with door.client("call") as http:
+        begun = http.post("/api/cabinet/export", json={})
+        assert begun.status_code == 202
+        where = f"/api/operations/{begun.json()['operation']}"
+        door.home.tasks[0].report(0.5, "half")
+        assert wait_until(lambda: http.get(where).json().get("text") == "half")
+        http.delete(where)
+        assert wait_until(lambda: door.home.tasks[0].cancel_requested)
+        door.home.tasks[0].finish()
+        assert http.get(where, params={"wait": 5}).json()["done"] is True
+        assert http.get("/api/operations/999").status_code == 404
+
+
+def test_who_hangs_up_while_waiting_ends_what_was_begun(door: Door) -> None:
+    with door.client("call") as http, suppress(httpx.ReadTimeout):
+        http.post("/api/cabinet/export", params={"wait": 30}, timeout=0.6)
+    assert wait_until(lambda: bool(door.home.tasks) and door.home.tasks[0].cancel_requested)
+    door.home.tasks[0].finish()
+
+
+def test_state_and_streams_are_followed_over_a_websocket(door: Door) -> None:
+    with door.line("view", ("cabinet/state", "cabinet/samples")) as line:
+        seen: dict[str, Any] = {}
+        for first in range(100):
+            door.home.emit(first, 2)
+            word = json.loads(line.recv(5.0))
+            seen[word["topic"]] = word["payload"]
+            if len(seen) == 2:
+                break
+        assert seen["cabinet/state"]["settings"]["name"] == "lamp"
+        assert seen["cabinet/samples"]["values"] == [0.0, 1.0]
+        line.send(json.dumps({"follow": ["cabinet/nothing"]}))
+        with pytest.raises(ConnectionClosed):
+            while True:
+                line.recv(5.0)
+
+
+def test_a_client_that_is_gone_leaves_nothing_moving(door: Door) -> None:
+    with door.client() as http, door.line() as line:
+        http.post("/api/control")
+        http.post("/api/cabinet/drawers/top/move", json={"target_um": 1.0})
+        dead_man = door.home.drawers["top"].dead_men[0]
+        assert not wait_until(lambda: dead_man.expired, 1.5), "the line keeps it alive"
+        line.socket.shutdown(socket.SHUT_RDWR)
+        assert wait_until(lambda: dead_man.expired, 1.0)
+        assert door.station.lease.state.local
+
+
+def test_a_client_that_falls_silent_loses_the_right_to_move(door: Door) -> None:
+    with door.client() as http:
+        http.post("/api/control")
+        http.post("/api/cabinet/drawers/top/move", json={"target_um": 1.0})
+        dead_man = door.home.drawers["top"].dead_men[0]
+        assert wait_until(lambda: dead_man.expired, 3.0)
+        late = http.post("/api/cabinet/drawers/top/move", json={"target_um": 2.0})
+        assert late.status_code == 409
+
+
+def test_tokens_decide_who_may_do_what(door: Door) -> None:
+    assert httpx.get(f"{door.address}/api/station").status_code == 401
+    wrong = {"Authorization": "Bearer wrong"}
+    assert httpx.get(f"{door.address}/api/station", headers=wrong).status_code == 401
+    with door.client("view") as viewer:
+        assert viewer.get("/api/cabinet/state/settings/name").json() == "lamp"
+        assert viewer.post("/api/cabinet/apply", json={"settings": {"name": "x"}}).is_client_error
+        assert viewer.post("/api/control").is_client_error
+        assert viewer.post("/api/cabinet/stop", json={}).is_success, "everybody may stop"
+    with door.client("call") as caller:
+        assert caller.post("/api/control").is_client_error
+        moved = caller.post("/api/cabinet/drawers/top/move", json={"target_um": 1.0})
+        assert moved.is_client_error
+    assert door.home.stops == 1
+    assert door.home.drawers["top"].moved_um == []
+
+
+BAD: list[tuple[str, bytes]] = [
+    ("/api/cabinet/apply", b"{"),
+    ("/api/cabinet/apply", b"[]"),
+    ("/api/cabinet/apply", b"\xff\xfe"),
+    ("/api/cabinet/apply", b"[" * 50_000),
+    ("/api/cabinet/apply", b'{"settings": ' + b"[" * 30_000 + b"]" * 30_000 + b"}"),
+    ("/api/cabinet/apply", b'{"settings": {"name": 1}}'),
+    ("/api/cabinet/apply", b'{"settings": {"name": "x", "other": 1}}'),
+    ("/api/cabinet/apply", b'{"@": ["x"], "settings": {"name": "x"}}'),
+    ("/api/cabinet/drawers/none/move", b'{"target_um": 1.0}'),
+    ("/api/cabinet/drawers/top/move", b'{"target_um": "1"}'),
+    ("/api/cabinet/drawers/top/move", b'{"target_um": 1' + b"0" * 400 + b"}"),
+    ("/api/cabinet/drawers/top/move", b'{"target_um": 1.0, "#": 7}'),
+    ("/api/cabinet/drawers/top/nudge", b"{}"),
+    ("/api/cabinet/emit", b'{"first": 0, "count": 1}'),
+    ("/api/cabinet/__class__", b"{}"),
+    ("/api/cabinet/", b"{}"),
+    ("/api/nothing/apply", b"{}"),
+    ("/api/cabinet/apply", b"x" * (BODY_LIMIT_BYTES + 1)),
+]
+
+
+def test_what_makes_no_sense_is_refused_and_nobody_else_notices(door: Door) -> None:
+    with door.client() as http:
+        http.post("/api/control")
+        for path, said in BAD:
+            answer = http.post(path, content=said)
+            assert answer.is_client_error, (path, said[:60], answer.text)
+            assert answer.json()["error"]["text"]
+        assert http.get("/api/cabinet/state/drawers/top/position_um").json() == 0.0
+    assert door.home.drawers["top"].moved_um == []
+    assert not door.failures
+
+
+def test_a_flood_of_one_client_is_held_back_and_a_stop_still_passes(
+    door: Door, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosmic.app.gateways.http.MOST_REQUESTS_S", 20.0)
+    codes: list[int] = []
+    ended = threading.Event()
+
+    async def flood() -> None:
+        headers = {"Authorization": f"Bearer {TOKENS['view']}"}
+        async with httpx.AsyncClient(base_url=door.address, headers=headers) as http:
+            while not ended.is_set():
+                answers = await asyncio.gather(
+                    *(http.get("/api/station") for _ in range(20)), return_exceptions=True
+                )
+                codes.extend(
+                    each.status_code for each in answers if isinstance(each, httpx.Response)
+                )
+
+    thread = threading.Thread(target=lambda: asyncio.run(flood()))
+    thread.start()
+    try:
+        with door.client("call") as other:
+            for number in range(10):
+                assert other.post("/api/cabinet/stop", json={}).is_success
+                assert door.home.stops == number + 1
+        assert wait_until(lambda: 429 in codes, 10.0)
+    finally:
+        ended.set()
+        thread.join()
+    assert not door.failures
+
+
+def test_raw_bytes_that_are_no_http_harm_nobody(door: Door) -> None:
+    host, port = door.address.removeprefix("http://").split(":")
+    for said in (b"\x00" * 1000, b"GET / HTTP/9\r\n\r\n", b"A" * 100_000, b"POST / HTTP/1.1\r\n"):
+        with socket.create_connection((host, int(port))) as raw, suppress(OSError):
+            raw.sendall(said)
+            raw.shutdown(socket.SHUT_WR)
+            raw.recv(1000)
+    with door.client("view") as http:
+        assert http.get("/api/station").json()["you"] == "view"
+    assert not door.failures
+
+
+def test_the_page_and_the_description_need_no_token(door: Door) -> None:
+    page = httpx.get(door.address)
+    assert "Live image" in page.text
+    assert "frame-ancestors 'none'" in page.headers["content-security-policy"]
+    assert httpx.get(f"{door.address}/openapi.json").json()["openapi"].startswith("3.1")
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"listen": "0.0.0.0:8470"},
+        {"listen": "192.168.1.2:80", "certificate": "a", "key": "b"},
+        {"listen": "nowhere:x"},
+        {"listen": "127.0.0.1:1", "certificate": "a"},
+    ],
+)
+def test_an_address_beyond_this_computer_needs_certificate_and_clients(settings: Any) -> None:
+    from cosmic.app.configuration.gateways import EpicsSettings
+
+    with pytest.raises(ConfigError):
+        doors(HttpSettings(**settings), EpicsSettings())
