@@ -140,6 +140,16 @@ def _add_file_commands(
     device.add_argument("kind", choices=DEVICE_KINDS, metavar="KIND", help=", ".join(DEVICE_KINDS))
     device.add_argument("name", metavar="NAME", help="what the platform file will say")
     device.add_argument("--out", type=Path, metavar="FOLDER", help="where (default: here)")
+    recompute = commands.add_parser(
+        "recompute", help="compute a campaign's values from its raw files, and say what changed"
+    )
+    recompute.add_argument("folder", type=Path, metavar="FOLDER")
+    recompute.add_argument(
+        "--recipe", type=Path, metavar="RECIPE", help="with the settings of another recipe"
+    )
+    recompute.add_argument(
+        "--apply", action="store_true", help="put the new values into record, report and table"
+    )
     repair = commands.add_parser("repair", help="close recordings that a killed process left open")
     repair.add_argument("recordings", type=Path, nargs="+", metavar="FILE")
     repair.add_argument("--ended", action="store_true", help="no program writes them any more")

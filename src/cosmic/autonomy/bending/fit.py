@@ -8,7 +8,14 @@ from typing import Final
 import numpy as np
 
 from cosmic.autonomy.bending.checks import checked
-from cosmic.autonomy.bending.inference import FRICTION, Readings, budget_of, readings_of
+from cosmic.autonomy.bending.inference import (
+    DRIFT,
+    FRICTION,
+    Readings,
+    budget_of,
+    common_prior,
+    readings_of,
+)
 from cosmic.autonomy.bending.population import Assessed, Population, assess
 from cosmic.autonomy.bending.response import direction_by_touch, response_of, straight
 from cosmic.autonomy.bending.result import (
@@ -22,8 +29,16 @@ from cosmic.autonomy.bending.result import (
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.bending.span_fit import fit_span
+from cosmic.autonomy.bending.standards import (
+    UNKNOWN_GAIN,
+    ForceScale,
+    StandardReading,
+    check_standards,
+    scale_of,
+)
 
 NEAR: Final = 0.03
+NORMAL_95: Final = 1.96
 LEAST_RUB, MOST_RUB = 0.02, 0.8
 """Friction that curves are laid out for."""
 
@@ -83,6 +98,14 @@ class MeasuredFibre:
     settings: FitSettings
     part: float = 0.0
     certificate: Certificate | None = None
+
+    def at(self, part: float) -> "MeasuredFibre":
+        """Return the same, measured when another part of the campaign was over."""
+        if self.readings is None:
+            return replace(self, part=part)
+        column = self.readings.to_common.copy()
+        column[:, DRIFT] = part
+        return replace(self, part=part, readings=replace(self.readings, to_common=column))
 
     def about(self, friction: float) -> "MeasuredFibre":
         """Return the same, fitted about another friction."""
@@ -194,9 +217,58 @@ def fit_campaign(
     standards : sequence of MeasuredFibre
         Measured with their certificates; without any the sensor's certificate is in the intervals.
     """
+    return assess_campaign(fibres, standards=standards, settings=settings).fibres
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CampaignFit:
+    """All of a campaign, assessed together.
+
+    Attributes
+    ----------
+    fibres : tuple of BendingResult
+        In the order they were handed over.
+    standards : tuple of BendingResult
+        The same of the standards, each by itself: whether it is a good measurement.
+    scale : ForceScale
+        How the scale of the force is known.
+    friction : float
+        About which the spans were fitted in the end.
+    """
+
+    fibres: tuple[BendingResult, ...]
+    standards: tuple[BendingResult, ...]
+    scale: ForceScale
+    friction: float
+
+
+def assess_campaign(
+    fibres: Sequence[MeasuredFibre],
+    *,
+    standards: Sequence[MeasuredFibre] = (),
+    settings: FitSettings | None = None,
+) -> CampaignFit:
+    """Return what `fit_campaign` does, with what the standards say of the scale of the force.
+
+    Parameters
+    ----------
+    standards : sequence of MeasuredFibre
+        Measured with their certificates; without any the sensor's certificate is in the intervals.
+    """
     settings = settings or FitSettings()
-    every = [*fibres, *standards]
-    verified = any(each.readings is not None for each in standards)
+    alone = tuple(_by_itself(each, settings) for each in standards)
+    measured = [
+        (each.readings, each.part, () if result.trusted else result.reasons)
+        for each, result in zip(standards, alone, strict=True)
+    ]
+    found = check_standards(measured, settings)
+    alone = tuple(
+        _as_read(result, each.certificate, reading)
+        for each, result, reading in zip(standards, alone, found.readings, strict=True)
+    )
+    settings = found.settings
+    every = [*fibres, *(standards[n] for n in found.used)]
+    verified = bool(found.used)
     assessed = _assessed(every, settings)
     rubs = settings.friction + float(assessed.common.mean[FRICTION]) if assessed else 0.0
     if assessed and abs(rubs - settings.friction) > NEAR:
@@ -204,13 +276,39 @@ def fit_campaign(
         rubs = min(max(rubs, LEAST_RUB), MOST_RUB)
         every = [each.about(rubs) for each in every]
         assessed = _assessed(every, settings, friction=rubs)
+    else:
+        rubs = settings.friction
     each_assessed = iter(assessed.fibres if assessed else ())
-    return tuple(
+    results = tuple(
         _nothing(each, settings)
         if each.readings is None
         else _concluded(each, each.readings, next(each_assessed), settings, verified=verified)
         for each in every[: len(fibres)]
     )
+    common = assessed.common if assessed else common_prior(settings)
+    return CampaignFit(results, alone, scale_of(common, found, verified=verified), rubs)
+
+
+def _as_read(
+    result: BendingResult, certificate: Certificate | None, reading: StandardReading
+) -> BendingResult:
+    """Return the stiffness that the sensor, by its own scale, has read of a standard."""
+    if certificate is None or not math.isfinite(reading.off_part):
+        return result
+    ei, std = certificate.ei_n_m2 * math.exp(reading.off_part), NORMAL_95 * reading.off_std_part
+    return replace(
+        result, ei_n_m2=ei, ei_low_n_m2=ei * math.exp(-std), ei_high_n_m2=ei * math.exp(std)
+    )
+
+
+def _by_itself(standard: MeasuredFibre, settings: FitSettings) -> BendingResult:
+    doubtful = {"gain_std_part": max(settings.gain_std_part, UNKNOWN_GAIN)}
+    settings = settings.model_copy(update=doubtful)
+    assessed = _assessed([standard], settings)
+    if assessed is None or standard.readings is None:
+        return _nothing(standard, settings)
+    (one,) = assessed.fibres
+    return _concluded(standard, standard.readings, one, settings, verified=False)
 
 
 def _assessed(
@@ -247,6 +345,27 @@ def _concluded(
         scale_verified=verified,
     )
     return checked(result, readings, assessed, settings)
+
+
+def in_time(measured: Sequence[MeasuredFibre], times_s: Sequence[float]) -> list[MeasuredFibre]:
+    """Return fibres and standards with the part of the campaign that was over at each.
+
+    Parameters
+    ----------
+    times_s : sequence of float
+        When each was measured, all on one clock; the first is the begin, the last the end.
+    """
+    first = min(times_s, default=0.0)
+    whole = max(times_s, default=0.0) - first
+    return [
+        each.at((time_s - first) / whole if whole > 0.0 else 0.0)
+        for each, time_s in zip(measured, times_s, strict=True)
+    ]
+
+
+def measured_s(spans: Sequence[Span]) -> float:
+    """Return when spans were measured: the mean of their times."""
+    return float(np.mean(np.concatenate([each.time_s for each in spans])))
 
 
 def positions_um(spans: Sequence[Span]) -> tuple[float, ...]:

@@ -187,6 +187,19 @@ def _shared(
     return solved(*none), [solved(*each) for each in said]
 
 
+def said_alone(read: Readings, settings: FitSettings) -> tuple[Floats, Floats]:
+    """Return what one fibre, or standard, says by itself of what is common.
+
+    Precision and precision times mean, without what is known beforehand.
+    """
+    prior = common_prior(settings)
+    evidence = evidence_of(read, prior, settings)
+    spreads = VARIATION_PRIOR / VARIATION_PRIOR.sum()
+    (weight,) = _prior_weights([evidence], [read], settings, spreads)
+    posterior = posterior_of(evidence, weight)
+    return _says(read, Assessed(posterior, evidence, prior, settings.friction), weight, settings)
+
+
 def _says(
     read: Readings, assessed: Assessed, weight: Floats, settings: FitSettings
 ) -> tuple[Floats, Floats]:

@@ -9,12 +9,13 @@ from functools import partial
 from threading import Condition
 from typing import Final
 
+from cosmic.autonomy.campaign.analysis import finish
 from cosmic.autonomy.campaign.recipe import Recipe
 from cosmic.autonomy.campaign.recorder import FibreRecorder, skip_known
 from cosmic.autonomy.campaign.records import FibreRecord
 from cosmic.autonomy.campaign.resume import ResumePlan
 from cosmic.autonomy.campaign.statistics import CampaignProgress
-from cosmic.autonomy.campaign.stop_rule import StopRule
+from cosmic.autonomy.campaign.stop_rule import StandardSchedule, StopRule
 from cosmic.autonomy.campaign.store import CampaignStore, NotWrittenError
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.push import armed_while_pushing
@@ -72,10 +73,13 @@ class Treatment:
         Treats one fibre; run once for each.
     measures : bool
         A fibre without a result is no good one.
+    standard : Procedure or None
+        Measures the standard and puts it back; None: there is none.
     """
 
     procedure: Procedure[HandlingContext]
     measures: bool = True
+    standard: Procedure[HandlingContext] | None = None
 
 
 class Campaign:
@@ -134,6 +138,9 @@ class Campaign:
         self._recorded = 0
         self._unwritten = False
         self._stuck = 0
+        self._standards = StandardSchedule(
+            work.settings.standard.at if treatment.standard is not None else ()
+        )
         work.shared.enough = self._enough
 
     # State
@@ -306,6 +313,7 @@ class Campaign:
         self.work.close()
         try:
             self._recorder.close(self._end_reason)
+            finish(self.store)
         except CosmicError as exc:
             failed, self._end_reason = True, f"{self._end_reason}; {exc}"
         finally:
@@ -324,16 +332,70 @@ class Campaign:
             self._rest()
             if self._abort is not None:
                 return self._abort
-            if reason := self._rule.reason(self.progress):
+            reason = self._rule.reason(self.progress)
+            if due := self._standards.due(self._share, ending=bool(reason)):
+                if ended := self._measure_standard(due):
+                    return ended
+                continue
+            if reason:
                 self._reached = True
                 return reason
             if reason := self._treat_one():
+                if self._abort is None and self._stopped() is None:
+                    self._measure_last_standard()
                 return reason
+
+    @property
+    def _share(self) -> float:
+        """Part of the campaign that is over, as far as can be told; nan: it cannot."""
+        now = self.progress
+        return now.elapsed_s / max(now.elapsed_s + self._rule.left_s(now), 1e-9)
+
+    def _measure_last_standard(self) -> None:
+        if due := self._standards.due(math.nan, ending=True):
+            self._measure_standard(due)
+
+    def _measure_standard(self, due: str) -> str:
+        """Measure the standard; returns why the campaign ends, or nothing.
+
+        A campaign goes on without it: its report says that the scale is not verified.
+        """
+        assert self._treatment.standard is not None
+        self._standards.done(due)
+        failure = self._carry_through(self._treatment.standard)
+        if isinstance(failure, str):
+            return failure
+        if failure is None:
+            return ""
+        if failure.cause == STOPPED:
+            self._record_cut_off(str(failure))
+            return str(failure)
+        self._record_finished()
+        for arm in self.work.arms:
+            if arm.fibre is not None:
+                self._record_held(arm, failure)
+        self.work.shared.surveyed = False
+        logger.warning("the standard was not measured at the %s: %s", due, failure)
+        self.store.note(
+            "standard",
+            "not measured",
+            {"at": due, "why": str(failure)},
+            time_s=self.work.clock.now_s(),
+        )
+        return ""
 
     def _treat_one(self) -> str:
         """Treat one fibre; returns why the campaign ends, or nothing."""
+        taken = len(self.work.shared.finished)
+        failure = self._carry_through(self._treatment.procedure)
+        if isinstance(failure, OperationFailed):
+            return self._after_failure(failure, taken)
+        return failure or ""
+
+    def _carry_through(self, procedure: Procedure[HandlingContext]) -> str | OperationFailed | None:
+        """Run a procedure to its end; returns why the campaign ends, or what failed."""
         run = ProcedureRun(
-            self._treatment.procedure,
+            procedure,
             self.work,
             self.work.clock,
             self._policy,
@@ -341,7 +403,6 @@ class Campaign:
         )
         run.subscribe(self._on_event)
         self._recorder.begin_run()
-        taken = len(self.work.shared.finished)
         if reason := self._follow(run):
             return reason
         try:
@@ -352,9 +413,9 @@ class Campaign:
             self._record_cut_off(str(exc))
             return self._abort or str(exc)
         except OperationFailed as exc:
-            return self._after_failure(exc, taken)
+            return exc
         self._record_finished()
-        return ""
+        return None
 
     def _after_failure(self, failure: OperationFailed, taken: int) -> str:
         if failure.cause == STOPPED:
@@ -467,6 +528,8 @@ class Campaign:
     def _enough(self) -> bool:
         """Tell whether no further fibre is to be begun, if those in work become good ones."""
         now, more = self.progress, len(self._recorder.in_work)
+        if self._standards.due(self._share, ending=False):
+            return True
         then = replace(now, done=now.done + more, good=now.good + more)
         return self._unwritten or self._abort is not None or bool(self._rule.reason(then))
 

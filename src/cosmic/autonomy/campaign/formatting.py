@@ -3,6 +3,7 @@
 import math
 from typing import Final
 
+from cosmic.autonomy.bending.standards import ForceScale
 from cosmic.autonomy.campaign.records import FibreRecord, Shape
 from cosmic.autonomy.campaign.statistics import MeanEi
 
@@ -24,6 +25,21 @@ def with_interval(value: float, std: float, digits: int = 0) -> str:
     if not (math.isfinite(value) and math.isfinite(std)):
         return number(value, digits)
     return f"{number(value, digits)} ± {number(TWO_SIDED * std, digits)}"
+
+
+def scale_words(scale: ForceScale | None) -> str:
+    """Return whether the scale of the force is verified, and by how much it was put right."""
+    if scale is None or not scale.verified:
+        text = "force scale not verified: the sensor's certificate is in every interval"
+        return "; ".join((text, *(scale.reasons if scale is not None else ())))
+    used = sum(not each.refused for each in scale.standards)
+    text = (
+        f"verified by a standard, measured {used} {'time' if used == 1 else 'times'}: the sensor "
+        f"reads {100.0 * scale.off_part:+.1f} ± {200.0 * scale.off_std_part:.1f} % (k = 2), which "
+        f"all values take into account; change over the campaign "
+        f"{100.0 * scale.drift_part:+.1f} ± {200.0 * scale.drift_std_part:.1f} %"
+    )
+    return "; ".join((text, *scale.reasons))
 
 
 def width_words(shape: Shape) -> str:

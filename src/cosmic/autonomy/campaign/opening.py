@@ -15,7 +15,8 @@ from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.handling.context import Applications, HandlingContext, vision_of
 from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.shipped.registry import PARAMETERS, PROCEDURES
+from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.shipped.registry import PARAMETERS, PROCEDURES, ShippedProcedure
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
 
@@ -108,7 +109,11 @@ def open_campaign(recipe: Recipe, folder: Path, host: CampaignHost) -> Campaign:
         undo.callback(store.close)
         campaign = Campaign(
             work,
-            Treatment(shipped.build(settings), measures=shipped.measures),
+            Treatment(
+                shipped.build(settings),
+                measures=shipped.measures,
+                standard=_standard(shipped, settings),
+            ),
             recipe,
             store,
             policy=host.policy,
@@ -117,6 +122,14 @@ def open_campaign(recipe: Recipe, folder: Path, host: CampaignHost) -> Campaign:
         )
         undo.pop_all()
     return campaign
+
+
+def _standard(
+    shipped: ShippedProcedure, settings: HandlingSettings
+) -> Procedure[HandlingContext] | None:
+    if shipped.standard is None or not settings.standard.ei_n_m2 > 0.0:
+        return None
+    return shipped.standard(settings)
 
 
 def _store(

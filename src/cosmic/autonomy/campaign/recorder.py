@@ -11,6 +11,9 @@ from typing import Final
 import numpy as np
 
 from cosmic.autonomy.campaign.records import (
+    FIBRE,
+    NOT_TRUSTED,
+    STANDARD,
     CalibrationNote,
     FibreImage,
     FibreRecord,
@@ -207,6 +210,7 @@ def record_of(
     events: Sequence[NodeEvent],
     series: tuple[Series, ...],
     interrupted: str = "",
+    elapsed_s: float = math.nan,
 ) -> FibreRecord:
     """Return the record of a fibre whose treatment has ended.
 
@@ -222,6 +226,8 @@ def record_of(
         Keep its images.
     interrupted : str
         Why the treatment was cut off; empty when it was not.
+    elapsed_s : float
+        When it was found, since the campaign began.
     """
     outcome, cause, text = _outcome(fibre, measures=measures, interrupted=interrupted)
     return FibreRecord(
@@ -252,6 +258,8 @@ def record_of(
         else (),
         operations=operations_of(events),
         series=series,
+        role=STANDARD if fibre.standard else FIBRE,
+        elapsed_s=elapsed_s,
     )
 
 
@@ -264,7 +272,7 @@ def _outcome(fibre: HeldFibre, *, measures: bool, interrupted: str) -> tuple[Out
         return outcome, fibre.failure.cause, fibre.failure.text
     if measures and (fibre.bending is None or not fibre.bending.trusted):
         reasons = "; ".join(fibre.bending.reasons) if fibre.bending is not None else "no result"
-        return Outcome.DOUBTFUL, "not trusted", reasons
+        return Outcome.DOUBTFUL, NOT_TRUSTED, reasons
     return Outcome.GOOD, "", ""
 
 
@@ -381,7 +389,10 @@ class FibreRecorder:
             self._motion.begin(min([fibre.found_s, *(each.found_s for each in self.in_work)]))
             candidate = fibre.reach.candidate
             number = self.store.begin_fibre(
-                pose_of(candidate), time_s=fibre.found_s, length_um=candidate.length_um
+                pose_of(candidate),
+                time_s=fibre.found_s,
+                length_um=candidate.length_um,
+                role=STANDARD if fibre.standard else FIBRE,
             )
             self._in_work = (*self._in_work, TreatedFibre(fibre, number))
 
@@ -409,6 +420,7 @@ class FibreRecorder:
                 events=self._events.get(fibre.arm, ()),
                 series=self._motion.series(fibre.found_s, felt_s=felt_s(fibre)),
                 interrupted=interrupted,
+                elapsed_s=self._before_s + fibre.found_s - self._began_s,
             )
         )
         self._in_work = tuple(each for each in self._in_work if each is not found)

@@ -20,6 +20,10 @@ Value = str | int | float | bool | None
 
 TWIN: Final = "digital twin"
 """What a campaign without hardware was made on."""
+NOT_TRUSTED: Final = "not trusted"
+"""Cause of a fibre whose result may not be used."""
+FIBRE: Final = "fibre"
+STANDARD: Final = "standard"
 UNRESOLVED: Final = 0.12
 """A width that is known no better than to this part of it was not resolved."""
 
@@ -153,6 +157,10 @@ class FibreRecord:
         Where it lay, and where it was put; None where that is not known.
     bending : BendingResult
         None where it was not measured.
+    role : str
+        "fibre", or "standard": one of those is no fibre of the sample.
+    elapsed_s : float
+        When it was found, since the campaign began, all runs together.
     """
 
     number: int
@@ -172,6 +180,8 @@ class FibreRecord:
     pictures = Renamed("images")
     operations: tuple[OperationRecord, ...] = ()
     series: tuple[Series, ...] = ()
+    role: str = FIBRE
+    elapsed_s: float = math.nan
 
     @property
     def duration_s(self) -> float:

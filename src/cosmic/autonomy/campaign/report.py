@@ -18,6 +18,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from cosmic.autonomy.bending.result import BendingResult
+from cosmic.autonomy.bending.standards import ForceScale
+from cosmic.autonomy.campaign.analysis import scale_in
 from cosmic.autonomy.campaign.formatting import (
     EI_LABEL,
     EI_UNIT,
@@ -27,6 +29,7 @@ from cosmic.autonomy.campaign.formatting import (
     mean_words,
     number,
     outcome_words,
+    scale_words,
     stiffness,
     when,
     width_words,
@@ -96,6 +99,7 @@ class ReportData:
     finished: tuple[FibreRecord, ...]
     calibrations: tuple[CalibrationNote, ...]
     operations: tuple[OperationTime, ...]
+    scale: ForceScale | None
     whole: Callable[[int], FibreRecord]
 
 
@@ -136,6 +140,7 @@ def report_data(reader: CampaignReader) -> ReportData:
         finished=finished,
         calibrations=reader.calibrations(),
         operations=operation_times(finished),
+        scale=scale_in(reader.analysis()),
         whole=lambda number: _whole(reader, number, finished),
     )
 
@@ -211,6 +216,7 @@ def _render(template: str, data: ReportData, *, svg: ShowSvg, png: ShowPng) -> s
             failures=drawn(bars("Failures by cause", causes) if causes else "", 430),
             operation_bars=drawn(_operation_bars(data), 560),
             operation_rows=[_operation_row(each) for each in data.operations],
+            standard_rows=_standard_rows(data.scale),
             calibration_rows=[_calibration_row(each) for each in data.calibrations],
             cards=_cards(data, svg, png),
             versions=sorted(data.info.versions.items()),
@@ -336,12 +342,22 @@ def budget_rows(result: BendingResult) -> list[tuple[str, ...]]:
 
 
 def _scale_words(data: ReportData) -> str:
-    results = [each.bending for each in data.finished if each.bending is not None]
-    if not results:
-        return NONE
-    if all(each.scale_verified for each in results):
-        return "verified by a standard"
-    return "force scale not verified: the sensor's certificate is in every interval"
+    measured = any(each.bending is not None for each in data.finished)
+    return scale_words(data.scale) if measured else NONE
+
+
+def _standard_rows(scale: ForceScale | None) -> list[tuple[str, ...]]:
+    if scale is None:
+        return []
+    return [
+        (
+            str(order),
+            f"{100.0 * each.part:.0f} %",
+            f"{number(100.0 * each.off_part, 1)} ± {number(200.0 * each.off_std_part, 1)} %",
+            each.refused or "used",
+        )
+        for order, each in enumerate(scale.standards, 1)
+    ]
 
 
 def _span_rows(result: BendingResult) -> list[tuple[str, ...]]:

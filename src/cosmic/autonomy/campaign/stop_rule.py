@@ -1,6 +1,7 @@
 """When a campaign is at its end, and how long it takes until then."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -81,6 +82,34 @@ class StopRule:
             times.append(max(wanted - now.good, 0.0) * good_cycle)
         known_s = [each for each in times if not math.isnan(each)]
         return min(known_s) if known_s else math.nan
+
+
+BEGIN, MIDDLE, END = "begin", "middle", "end"
+
+
+class StandardSchedule:
+    """When the standard is due; each start of the program begins anew.
+
+    Parameters
+    ----------
+    at : sequence of str
+        Of "begin", "middle" and "end", those that are wanted.
+    """
+
+    def __init__(self, at: Sequence[str]) -> None:
+        self._left = list(at)
+
+    def due(self, share: float, *, ending: bool) -> str:
+        """Return what is due when a part of the campaign is over; empty: nothing."""
+        if BEGIN in self._left:
+            return BEGIN
+        if ending:
+            return END if END in self._left else ""
+        return MIDDLE if MIDDLE in self._left and share >= 0.5 else ""
+
+    def done(self, due: str) -> None:
+        """Note that it was measured, or tried."""
+        self._left.remove(due)
 
 
 def _needed(now: CampaignProgress, precision_percent: float) -> float:

@@ -5,7 +5,7 @@ import json
 import math
 import sqlite3
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
@@ -16,6 +16,7 @@ from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.bending.result import BendingResult, Contribution, Kind, Quality, SpanFit
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.campaign.records import (
+    FIBRE,
     CampaignError,
     FibreImage,
     FibreRecord,
@@ -30,6 +31,8 @@ from cosmic.autonomy.campaign.records import (
 DATABASE: Final = "campaign.sqlite"
 FIBRES: Final = "fibres"
 """Folder with a file for each fibre."""
+FINAL: Final = "analysis.h5"
+"""The model of the final analysis at each point of each span; raw files are never written again."""
 
 SCHEMA_VERSION: Final = 2
 
@@ -41,7 +44,8 @@ CREATE TABLE campaign (
     description TEXT NOT NULL, operator TEXT NOT NULL, hardware TEXT NOT NULL,
     seed INTEGER NOT NULL, rate REAL NOT NULL, versions_json TEXT NOT NULL,
     world TEXT NOT NULL DEFAULT '',
-    ended TEXT NOT NULL DEFAULT '', end_reason TEXT NOT NULL DEFAULT ''
+    ended TEXT NOT NULL DEFAULT '', end_reason TEXT NOT NULL DEFAULT '',
+    analysis_json TEXT NOT NULL DEFAULT ''
 );
 CREATE TABLE run (
     number INTEGER PRIMARY KEY, started TEXT NOT NULL, versions_json TEXT NOT NULL,
@@ -65,7 +69,9 @@ CREATE TABLE fibre (
     trusted INTEGER, flags TEXT NOT NULL DEFAULT '', reasons TEXT NOT NULL DEFAULT '',
     used_spans TEXT NOT NULL DEFAULT '', file TEXT NOT NULL DEFAULT '',
     budget_json TEXT NOT NULL DEFAULT '[]', scale_verified INTEGER NOT NULL DEFAULT 0,
-    notes TEXT NOT NULL DEFAULT ''
+    notes TEXT NOT NULL DEFAULT '', role TEXT NOT NULL DEFAULT 'fibre',
+    file_sha256 TEXT NOT NULL DEFAULT '', online_ei_n_m2 REAL,
+    online_outcome TEXT NOT NULL DEFAULT ''
 );
 CREATE TABLE span (
     fibre INTEGER NOT NULL REFERENCES fibre, number INTEGER NOT NULL,
@@ -95,11 +101,18 @@ CREATE TABLE journal (
 
 
 ADDED: Final = {
-    "campaign": {"world": "TEXT NOT NULL DEFAULT ''"},
+    "campaign": {
+        "world": "TEXT NOT NULL DEFAULT ''",
+        "analysis_json": "TEXT NOT NULL DEFAULT ''",
+    },
     "fibre": {
         "budget_json": "TEXT NOT NULL DEFAULT '[]'",
         "scale_verified": "INTEGER NOT NULL DEFAULT 0",
         "notes": "TEXT NOT NULL DEFAULT ''",
+        "role": "TEXT NOT NULL DEFAULT 'fibre'",
+        "file_sha256": "TEXT NOT NULL DEFAULT ''",
+        "online_ei_n_m2": "REAL",
+        "online_outcome": "TEXT NOT NULL DEFAULT ''",
     },
 }
 """Columns that a campaign begun with an earlier program does not have."""
@@ -170,18 +183,24 @@ def fibre_row(record: FibreRecord, file: str) -> dict[str, Cell]:
     }
     row |= {name: cell(getattr(record.shape, name)) for name in SHAPE_NUMBERS}
     row |= _pose_row("found", record.found) | _pose_row("left", record.left)
-    result = record.bending
-    if result is not None:
-        row |= {name: cell(getattr(result, name)) for name in RESULT_NUMBERS}
-        row["freedom"] = result.freedom
-        row["trusted"] = int(result.trusted)
-        row["flags"] = SEPARATOR.join(sorted(result.flags))
-        row["reasons"] = SEPARATOR.join(result.reasons)
-        row["used_spans"] = " ".join(map(str, result.used))
-        row["budget_json"] = json.dumps([asdict(line) for line in result.budget])
-        row["scale_verified"] = int(result.scale_verified)
-        row["notes"] = SEPARATOR.join(sorted(result.notes))
+    if record.bending is not None:
+        row |= result_row(record.bending)
     return row
+
+
+def result_row(result: BendingResult) -> dict[str, Cell]:
+    """Return the cells of a fibre's result."""
+    row: dict[str, Cell] = {name: cell(getattr(result, name)) for name in RESULT_NUMBERS}
+    return row | {
+        "freedom": result.freedom,
+        "trusted": int(result.trusted),
+        "flags": SEPARATOR.join(sorted(result.flags)),
+        "reasons": SEPARATOR.join(result.reasons),
+        "used_spans": " ".join(map(str, result.used)),
+        "budget_json": json.dumps([asdict(line) for line in result.budget]),
+        "scale_verified": int(result.scale_verified),
+        "notes": SEPARATOR.join(sorted(result.notes)),
+    }
 
 
 def _pose_row(which: str, pose: Pose | None) -> dict[str, Cell]:
@@ -253,6 +272,7 @@ def fibre_record(row: Row, spans: Sequence[Row], operations: Sequence[Row]) -> F
         peak_force_un=number(row["peak_force_un"]),
         bending=None if row["trusted"] is None else _result(row, spans),
         operations=tuple(_operation(each) for each in operations),
+        role=str(row.get("role", FIBRE)),
     )
 
 
@@ -345,7 +365,15 @@ def curves_file(record: FibreRecord) -> bytes:
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         file.attrs.update(
-            {"format": FORMAT, "format_version": FORMAT_VERSION, "fibre": record.number}
+            {
+                "format": FORMAT,
+                "format_version": FORMAT_VERSION,
+                "fibre": record.number,
+                "role": record.role,
+                "width_um": record.shape.width_um,
+                "elapsed_s": record.elapsed_s,
+                "assessed": record.bending is not None,
+            }
         )
         for number, span in enumerate(record.spans):
             group = file.create_group(f"spans/{number:02d}")
@@ -429,3 +457,70 @@ def _fitted(group: h5py.Group) -> Floats:
     if "fitted_un" in group:
         return np.asarray(group["fitted_un"], dtype=np.float64)
     return np.full(len(group["way_um"]), np.nan)
+
+
+def fitted_file(fitted: Mapping[int, Sequence[Floats]]) -> bytes:
+    """Return the file of the model at each point, by fibre and span."""
+    memory = io.BytesIO()
+    with h5py.File(memory, "w") as file:
+        file.attrs.update({"format": "cosmic analysis", "format_version": FORMAT_VERSION})
+        for fibre, curves in fitted.items():
+            for number, curve in enumerate(curves):
+                file[f"{fibre:05d}/{number:02d}"] = curve
+    return memory.getvalue()
+
+
+def read_fitted(path: Path, fibre: int) -> tuple[Floats, ...]:
+    """Return the model at each point of the spans of a fibre; empty where it is not there."""
+    if not path.exists():
+        return ()
+    try:
+        with h5py.File(path, "r") as file:
+            group = file.get(f"{fibre:05d}", {})
+            return tuple(np.asarray(group[name], dtype=np.float64) for name in sorted(group))
+    except OSError as exc:
+        raise CampaignError(f"{path} cannot be read: {exc}") from exc
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RawFibre:
+    """What the raw file of a fibre, or of a standard, holds for its analysis.
+
+    Attributes
+    ----------
+    assessed : bool
+        The campaign came to a value, or to the reason why there is none.
+    """
+
+    number: int
+    role: str
+    width_um: float
+    elapsed_s: float
+    assessed: bool
+    spans: tuple[Span, ...]
+
+
+def read_raw(path: Path) -> RawFibre:
+    """Return the raw file of a fibre.
+
+    Raises
+    ------
+    CampaignError
+        The file is not there, not whole, or of a program that did not write what this needs.
+    """
+    spans, _, _ = read_curves(path)
+    try:
+        with h5py.File(path, "r") as file:
+            held = file.attrs
+            return RawFibre(
+                number=int(held["fibre"]),
+                role=str(held["role"]),
+                width_um=float(held["width_um"]),
+                elapsed_s=float(held["elapsed_s"]),
+                assessed=bool(held["assessed"]),
+                spans=spans,
+            )
+    except KeyError as exc:
+        raise CampaignError(
+            f"{path} was written before raw files held all that an analysis needs: {exc}"
+        ) from exc

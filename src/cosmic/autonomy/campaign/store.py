@@ -14,8 +14,11 @@ from typing import Final, Self
 
 import cv2
 
+from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.campaign.records import (
+    FIBRE,
     FINISHED,
+    NOT_TRUSTED,
     CalibrationNote,
     CampaignError,
     CampaignInfo,
@@ -38,6 +41,7 @@ from cosmic.autonomy.campaign.storage_format import (
     image_row,
     insert,
     operation_row,
+    result_row,
     span_row,
     update,
 )
@@ -297,8 +301,14 @@ class CampaignStore:
         time_s: float = 0.0,
         versions: Mapping[str, str] | None = None,
         now: Now = _now,
+        run: bool = True,
     ) -> Self:
         """Open a campaign to go on with it; what was running when it ended is left running.
+
+        Parameters
+        ----------
+        run : bool
+            It is gone on with; otherwise what stands in it is only analysed anew.
 
         Raises
         ------
@@ -314,7 +324,8 @@ class CampaignStore:
             remove_parts(folder / FIBRES)
             with store._connection.transaction() as connection:  # noqa: SLF001 - its own class
                 add_columns(connection)
-            store._begin_run(time_s, versions or {})  # noqa: SLF001 - its own class
+            if run:
+                store._begin_run(time_s, versions or {})  # noqa: SLF001 - its own class
         except BaseException:
             store.close()
             raise
@@ -358,7 +369,12 @@ class CampaignStore:
     # ------------------------------------------------------------------ writing
 
     def begin_fibre(
-        self, found: Pose | None = None, *, time_s: float, length_um: float = math.nan
+        self,
+        found: Pose | None = None,
+        *,
+        time_s: float,
+        length_um: float = math.nan,
+        role: str = FIBRE,
     ) -> int:
         """Note that a fibre's treatment begins, and return its number.
 
@@ -369,6 +385,7 @@ class CampaignStore:
             "outcome": Outcome.RUNNING.value,
             "began_s": time_s,
             "length_um": cell(length_um),
+            "role": role,
         }
         if found is not None:
             row["found_x_plate_um"] = found.x_plate_um
@@ -418,7 +435,10 @@ class CampaignStore:
                 self._refuse_unless_running(connection, record.number)
             name = f"{record.number:05d}"
             curves = PurePosixPath(FIBRES, f"{name}.h5")
-            write_whole(self.folder / curves, curves_file(record))
+            content = curves_file(record)
+            write_whole(self.folder / curves, content)
+            row = fibre_row(record, str(curves))
+            row["file_sha256"] = hashlib.sha256(content).hexdigest()
             images = [
                 self._write_image(image, PurePosixPath(FIBRES, f"{name}-{order:02d}.png"))
                 for order, image in enumerate(record.images)
@@ -426,12 +446,51 @@ class CampaignStore:
             write_through(self.folder / FIBRES)
             with self._connection.transaction() as connection:
                 self._refuse_unless_running(connection, record.number)
-                update(connection, "fibre", fibre_row(record, str(curves)), key=record.number)
+                update(connection, "fibre", row, key=record.number)
                 fits = record.bending.spans if record.bending is not None else ()
                 _insert_all(connection, "span", record.number, [span_row(fit) for fit in fits])
                 _insert_all(connection, "picture", record.number, images)
                 steps = [operation_row(each) for each in record.operations]
                 _insert_all(connection, "operation", record.number, steps)
+
+    def keep_analysis(
+        self, results: Mapping[int, BendingResult], analysis: Mapping[str, object]
+    ) -> None:
+        """Put final results in the place of those of the campaign, which are kept beside them.
+
+        A measured fibre is good or not by its final result; one that failed by something else
+        stays as it was.
+
+        Parameters
+        ----------
+        results : mapping of int to BendingResult
+            By the number of the fibre.
+        analysis : mapping
+            What it was done with, and what it says of all fibres together; goes into the record as
+            JSON.
+        """
+        with self._connection.transaction() as connection:
+            for fibre, result in results.items():
+                outcome, cause, ei = connection.execute(
+                    "SELECT outcome, cause, ei_n_m2 FROM fibre WHERE number = ?", (fibre,)
+                ).fetchone()
+                row = result_row(result)
+                if outcome == Outcome.GOOD or cause == NOT_TRUSTED:
+                    outcome_now = Outcome.GOOD if result.trusted else Outcome.DOUBTFUL
+                    row["outcome"] = outcome_now.value
+                    row["cause"] = "" if result.trusted else NOT_TRUSTED
+                    row["text"] = "" if result.trusted else "; ".join(result.reasons)
+                update(connection, "fibre", row, key=fibre)
+                connection.execute(
+                    "UPDATE fibre SET online_outcome = ?, online_ei_n_m2 = ? "
+                    "WHERE number = ? AND online_outcome = ''",
+                    (outcome, ei, fibre),
+                )
+                connection.execute("DELETE FROM span WHERE fibre = ?", (fibre,))
+                _insert_all(connection, "span", fibre, [span_row(each) for each in result.spans])
+            connection.execute(
+                "UPDATE campaign SET analysis_json = ?", (json.dumps(dict(analysis)),)
+            )
 
     def interrupt_running(self, text: str = "the campaign ended without warning") -> list[int]:
         """Mark fibres that were in treatment when the campaign ended, and return their numbers."""

@@ -7,11 +7,13 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 
 from cosmic.autonomy.campaign.records import (
+    FIBRE,
     FINISHED,
     CalibrationNote,
     CampaignError,
@@ -23,12 +25,14 @@ from cosmic.autonomy.campaign.records import (
 )
 from cosmic.autonomy.campaign.storage_format import (
     DATABASE,
+    FINAL,
     SCHEMA_VERSION,
     Cell,
     Row,
     fibre_record,
     number,
     read_curves,
+    read_fitted,
     region_px,
 )
 from cosmic.frame.arguments import checked_class
@@ -112,14 +116,46 @@ class CampaignReader:
             for row in self._rows("SELECT DISTINCT name, residual, unit, made FROM calibration")
         )
 
-    def fibres(self) -> tuple[FibreRecord, ...]:
-        """Return all fibres without curves and images, those in treatment included."""
+    def fibres(self, role: str = FIBRE) -> tuple[FibreRecord, ...]:
+        """Return all fibres without curves and images, those in treatment included.
+
+        Parameters
+        ----------
+        role : str
+            "standard" for the measurements of the standard, which are no fibres.
+        """
         spans = self._by_fibre("SELECT * FROM span ORDER BY fibre, number")
         steps = self._by_fibre("SELECT * FROM operation ORDER BY fibre, number")
         return tuple(
-            fibre_record(row, spans.get(row["number"], []), steps.get(row["number"], []))
+            record
             for row in self._rows("SELECT * FROM fibre ORDER BY number")
+            if (
+                record := fibre_record(
+                    row, spans.get(row["number"], []), steps.get(row["number"], [])
+                )
+            ).role
+            == role
         )
+
+    def raw_files(self) -> dict[int, tuple[Path, str]]:
+        """Return where the raw curves of finished fibres and standards are, with their SHA-256.
+
+        The hash is empty of files that an earlier program wrote.
+        """
+        finished = {each.value for each in FINISHED}
+        return {
+            int(number(row["number"])): (
+                self.folder / str(row["file"]),
+                str(row.get("file_sha256", "")),
+            )
+            for row in self._rows("SELECT * FROM fibre ORDER BY number")
+            if row["file"] and row["outcome"] in finished
+        }
+
+    def analysis(self) -> dict[str, Any]:
+        """Return what the final analysis was done with, and what it says; empty: there is none."""
+        (row,) = self._rows("SELECT * FROM campaign")
+        return dict(json.loads(str(row.get("analysis_json") or "{}")))
 
     def finished(self) -> tuple[FibreRecord, ...]:
         """Return the fibres that have their end, without curves and images."""
@@ -144,6 +180,7 @@ class CampaignReader:
         measured, fitted, series = read_curves(self.folder / str(rows[0]["file"]))
         bending = record.bending
         if bending is not None:
+            fitted = read_fitted(self.folder / FINAL, fibre) or fitted
             fits = [
                 replace(fit, fitted_un=curve)
                 for fit, curve in zip(bending.spans, fitted, strict=False)

@@ -45,6 +45,8 @@ class SharedWorkspace:
         Of the last survey, less those that were taken; on the plate.
     skipped : list of Candidate
         Those on which grasping failed: they are not tried a second time.
+    standard : Candidate or None
+        The standard, where the last survey has seen it free.
     dropped : list of HeldFibre
         Those that were measured, and fell on the way to the bin: they lie on the plate again.
     skip_reasons : Counter of str
@@ -67,6 +69,7 @@ class SharedWorkspace:
     candidates: list[Candidate] = field(default_factory=list)
     lines_um: list[Floats] = field(default_factory=list)
     skipped: list[Candidate] = field(default_factory=list)
+    standard: Candidate | None = None
     dropped: list[HeldFibre] = field(default_factory=list)
     skip_reasons: Counter[str] = field(default_factory=Counter)
     zoomed: float | None = None

@@ -38,6 +38,8 @@ class HeldFibre:
         When it had the probe to itself, where two arms are at work.
     stuck : bool
         It could not be put away.
+    standard : bool
+        It is the standard: it is put back where it lay.
     measured : MeasuredFibre or None
         Its spans as they were fitted, each by itself.
     contacts : list of (float, float)
@@ -72,6 +74,7 @@ class HeldFibre:
     probe_from_s: float | None = None
     probe_until_s: float | None = None
     stuck: bool = False
+    standard: bool = False
 
     @property
     def length_um(self) -> float:

@@ -9,7 +9,13 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
-from cosmic.autonomy.bending.fit import fit_campaign, measure_fibre
+from cosmic.autonomy.bending.fit import (
+    Certificate,
+    assess_campaign,
+    in_time,
+    measure_fibre,
+    measured_s,
+)
 from cosmic.autonomy.bending.plan import DRY_EI_N_M2, PlannedSpan, SpanLimits, guess_ei, plan_spans
 from cosmic.autonomy.bending.result import BendingError
 from cosmic.autonomy.bending.span import Span
@@ -19,6 +25,7 @@ from cosmic.autonomy.handling.grasp import shape_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.prepare import retract_probe
 from cosmic.autonomy.handling.retrying_move import RetryingMove
+from cosmic.autonomy.handling.settings import StandardSettings
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Yielded
 from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.errors import DeviceError, NotAvailable
@@ -415,15 +422,36 @@ class FitSpans(FibreOperation):
     @override
     def steps(self, work: HandlingContext) -> Steps:
         fibre = work.held_fibre()
-        fit = work.settings.push.fit.model_copy(update={"fibre_width_um": fibre.width_um})
-        fibre.measured = measure_fibre(fibre.spans, settings=fit)
-        before = [each.measured for each in work.shared.finished if each.measured is not None]
+        standard = work.settings.standard
+        width_um = standard.width_um if fibre.standard else fibre.width_um
+        fit = work.settings.push.fit.model_copy(update={"fibre_width_um": width_um})
+        fibre.measured = measure_fibre(
+            fibre.spans,
+            settings=fit,
+            certificate=certificate_of(standard) if fibre.standard else None,
+        )
+        before = [each for each in work.shared.finished if each.measured is not None]
         # What is common to all fibres is learned from those before; the last ones are enough.
-        fibres = [*before[-LEARNED_FROM:], fibre.measured]
-        fibre.bending = fit_campaign(fibres, settings=fit)[-1]
+        fibres = [each for each in before if not each.standard][-LEARNED_FROM:]
+        kept = [*fibres, *(each for each in before if each.standard), fibre]
+        measured = in_time(
+            [each.measured for each in kept if each.measured is not None],
+            [measured_s(each.spans) for each in kept],
+        )
+        found = assess_campaign(
+            [each for each in measured if each.certificate is None],
+            standards=[each for each in measured if each.certificate is not None],
+            settings=fit,
+        )
+        fibre.bending = (found.standards if fibre.standard else found.fibres)[-1]
         if not fibre.bending.trusted:
             raise OperationFailed(NOT_TRUSTED, "; ".join(fibre.bending.reasons))
         yield SAFE_POINT
+
+
+def certificate_of(standard: StandardSettings) -> Certificate:
+    """Return what a recipe says of the standard."""
+    return Certificate(standard.ei_n_m2, standard.expanded_percent / 100.0)
 
 
 class StepBack(FibreOperation):

@@ -112,7 +112,7 @@ class Wipe(FibreOperation):
     def steps(self, work: HandlingContext) -> Steps:
         positions = work.settings.places
         yield work.rise(positions.travel_um)
-        yield work.go(bin_position(work))
+        yield work.go(self.where(work))
         with work.mico.collision.contact("grasp"):
             yield work.go_up(work.grasp_um)
             for _ in range(SHAKES):
@@ -122,6 +122,10 @@ class Wipe(FibreOperation):
             yield work.go(work.at(work.gripper, x, y + WIPE_UM))
             yield work.go(work.at(work.gripper, x - WIPE_UM * work.jaws.forward * 0.5, y))
             yield work.go_up(positions.bin_um)
+
+    def where(self, work: HandlingContext) -> dict[str, float]:
+        """Return where the gripper's axes stand meanwhile."""
+        return bin_position(work)
 
 
 class Finish(FibreOperation):

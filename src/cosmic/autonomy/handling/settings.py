@@ -213,6 +213,38 @@ class PushSettings(StrictModel):
     fit: FitSettings = Field(default_factory=FitSettings)
 
 
+class StandardSettings(StrictModel):
+    """A beam of certified stiffness that lies on the plate: bent like a fibre, and put back.
+
+    Attributes
+    ----------
+    ei_n_m2 : float
+        Bending stiffness by its certificate; 0: there is no standard.
+    expanded_percent : float
+        Expanded uncertainty of that, k = 2.
+    certificate : str
+        Number of the certificate, for the record.
+    length_um, width_um : float
+        By the length it is known on the plate; the width makes the rounding that it slides on.
+    x_um, y_um, within_um : float
+        Where its middle lies on a plate that is put on, and how far from there it is looked for.
+    at : tuple of str
+        When it is measured.
+    """
+
+    ei_n_m2: float = Field(0.0, ge=0.0)
+    expanded_percent: float = Field(2.0, ge=0.0, lt=50.0)
+    certificate: str = ""
+    length_um: float = Field(2000.0, gt=0.0)
+    width_um: float = Field(15.0, gt=0.0)
+    x_um: float = 0.0
+    y_um: float = -3900.0
+    within_um: float = Field(800.0, gt=0.0)
+    at: tuple[Literal["begin", "middle", "end"], ...] = Field(
+        ("begin", "middle", "end"), strict=False
+    )
+
+
 class HandlingSettings(StrictModel):
     """All settings of the operations that handle fibres.
 
@@ -244,6 +276,7 @@ class HandlingSettings(StrictModel):
     push: PushSettings = Field(default_factory=PushSettings)
     calibration: CalibrationSettings = Field(default_factory=CalibrationSettings)
     pair: PairSettings = Field(default_factory=PairSettings)
+    standard: StandardSettings = Field(default_factory=StandardSettings)
 
     def misfits(
         self, *, tools: Collection[str], cameras: Collection[str], channels: Collection[str]

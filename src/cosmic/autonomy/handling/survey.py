@@ -12,6 +12,7 @@ from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Neighbours, Reach, distance_um, reaches
 from cosmic.autonomy.handling.prepare import clear_image
+from cosmic.autonomy.handling.settings import StandardSettings
 from cosmic.autonomy.handling.sight import SeenFibre, find_seen
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.vico.core.image import CameraImage
@@ -32,6 +33,8 @@ LOOK_AGAIN = "look again"
 SAME_UM = 120.0
 SAME_LENGTH = 0.05
 OWN_UM = 1.0
+STANDARD_LENGTH = 0.03
+STANDARD_CURL = 0.01
 DROPPED_LENGTH = 0.004
 DROPPED_WIDTH = 0.15
 DROPPED_CURL = 0.006
@@ -75,8 +78,16 @@ def look(work: HandlingContext, seen: list[SeenFibre]) -> None:
     """Take note of what lies on the plate, and of what may be taken."""
     angle, frame = work.table_deg, work.calibration.frame
     found = [_candidate(work, each, frame.on_plate(each.line_um, angle)) for each in seen]
+    standard = standard_among(found, work.settings.standard)
     before, work.shared.lines_um = work.shared.lines_um, [each.line_um for each in found]
-    checked = [replace(each, problem=each.problem or _lonely(work, each)) for each in found]
+    work.shared.standard = None
+    if standard is not None and not (standard.problem or _crowded(work, standard)):
+        work.shared.standard = standard
+    checked = [
+        replace(each, problem=each.problem or _lonely(work, each))
+        for each in found
+        if each is not standard
+    ]
     checked = leave_dropped(checked, work.shared.dropped)
     checked = _leave_fallen(work, checked, before)
     work.shared.candidates = [each for each in checked if not each.problem]
@@ -131,9 +142,27 @@ def _candidate(work: HandlingContext, seen: SeenFibre, line_um: Floats) -> Candi
     )
 
 
+def standard_among(found: list[Candidate], settings: StandardSettings) -> Candidate | None:
+    """Return the sighting of the standard: straight, as long as it is, and near where it lies."""
+    if not settings.ei_n_m2 > 0.0:
+        return None
+    fitting = [
+        (abs(each.length_um / settings.length_um - 1.0), number)
+        for number, each in enumerate(found)
+        if each.curl <= STANDARD_CURL
+        and abs(each.length_um / settings.length_um - 1.0) <= STANDARD_LENGTH
+        and math.dist(each.position_um, (settings.x_um, settings.y_um)) <= settings.within_um
+    ]
+    return found[min(fitting)[1]] if fitting else None
+
+
 def _lonely(work: HandlingContext, candidate: Candidate) -> str:
     if any(same_fibre(candidate, each) for each in work.shared.skipped):
         return SKIPPED
+    return _crowded(work, candidate)
+
+
+def _crowded(work: HandlingContext, candidate: Candidate) -> str:
     near = (
         distance_um(candidate.line_um, line) < work.settings.grasp.clear_um
         for line in work.shared.lines_um
@@ -187,22 +216,7 @@ class Choose(FibreOperation):
         best = min(approaches, key=lambda each: self.rank(work, each, angle), default=None)
         if best is None:
             raise self.none(work)
-        work.shared.candidates = [
-            each for each in work.shared.candidates if each is not best.candidate
-        ]
-        gone = best.candidate.line_um.mean(axis=0)
-        work.shared.lines_um = [
-            line
-            for line in work.shared.lines_um
-            if np.linalg.norm(line.mean(axis=0) - gone) > OWN_UM
-        ]
-        work.shared.numbers += 1
-        work.shared.since_survey += 1
-        work.fibre = HeldFibre(work.shared.numbers, best, found_s=work.clock.now_s())
-        if work.beside_another:
-            work.fibre.arm = work.settings.gripper
-        else:
-            work.forces.take_peak_un()
+        take(work, best)
         yield SAFE_POINT
 
     def rank(self, work: HandlingContext, approach: Reach, angle_deg: float) -> tuple[float, ...]:  # noqa: ARG002
@@ -232,3 +246,22 @@ def approaches_of(work: HandlingContext, candidate: Candidate, angle_deg: float)
         Neighbours(others),
         angle_deg,
     )
+
+
+def take(work: HandlingContext, approach: Reach, *, standard: bool = False) -> None:
+    """Note that a candidate is to be taken up."""
+    candidate = approach.candidate
+    work.shared.candidates = [each for each in work.shared.candidates if each is not candidate]
+    gone = candidate.line_um.mean(axis=0)
+    work.shared.lines_um = [
+        line for line in work.shared.lines_um if np.linalg.norm(line.mean(axis=0) - gone) > OWN_UM
+    ]
+    work.shared.numbers += 1
+    work.shared.since_survey += 1
+    work.fibre = HeldFibre(
+        work.shared.numbers, approach, found_s=work.clock.now_s(), standard=standard
+    )
+    if work.beside_another:
+        work.fibre.arm = work.settings.gripper
+    else:
+        work.forces.take_peak_un()

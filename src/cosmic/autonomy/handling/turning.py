@@ -147,4 +147,6 @@ def _put_in_force(work: HandlingContext, frame: PlateFrame) -> None:
     work.calibration.frame = frame
     work.shared.lines_um = [again(each) for each in work.shared.lines_um]
     work.shared.candidates = [each.moved(again(each.line_um)) for each in work.shared.candidates]
+    if (standard := work.shared.standard) is not None:
+        work.shared.standard = standard.moved(again(standard.line_um))
     work.shared.skipped = [each.moved(again(each.line_um)) for each in work.shared.skipped]

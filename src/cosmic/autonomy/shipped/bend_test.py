@@ -34,6 +34,14 @@ from cosmic.autonomy.handling.reach import (
     Turn,
 )
 from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.handling.standard import (
+    NO_STANDARD,
+    CarryBack,
+    ChooseStandard,
+    LeaveStandard,
+    LookForStandard,
+    WipeAtHome,
+)
 from cosmic.autonomy.handling.survey import LOOK_AGAIN, Choose, Survey
 from cosmic.autonomy.handling.turning import FindRotationCentre
 from cosmic.autonomy.procedures.combinators import Fallback, Retry, Sequence
@@ -42,6 +50,7 @@ from cosmic.autonomy.shipped.calibrate import calibrated
 
 RELEASES = 4
 PUSHES = 3
+LOOKS = 2
 
 
 def build_bend_test(settings: HandlingSettings | None = None) -> Procedure[HandlingContext]:
@@ -108,6 +117,53 @@ def put_away() -> Part[HandlingContext]:
     """Return the way to the bin, with the jaws seen to be empty at the end."""
     released = Retry(Release(), RELEASES, only={ADHESION}, between=Wipe())
     return Sequence("put away", ToBin(), released)
+
+
+def build_standard(settings: HandlingSettings | None = None) -> Procedure[HandlingContext]:
+    """Return the procedure that bends the standard and puts it back, with one gripper."""
+    settings = settings or HandlingSettings()
+    begin = Sequence(
+        "prepare",
+        InitialiseAgain(),
+        ClearUp(),
+        MakeReady(),
+        *calibrated(settings),
+        LookForStandard(),
+        FindRotationCentre(),
+        SeeForce(),
+    )
+    return Procedure(
+        "standard",
+        Sequence("standard", begin, one_standard(settings, Carry())),
+        make_safe=make_safe,
+    )
+
+
+def one_standard(
+    settings: HandlingSettings, carry: Part[HandlingContext], *leaving: Part[HandlingContext]
+) -> Part[HandlingContext]:
+    """Return the path of the standard from the plate to the probe and back, whatever happens."""
+    back = Sequence[HandlingContext](
+        "put back",
+        *leaving,
+        CarryBack(),
+        Retry(Release(), RELEASES, only={ADHESION}, between=WipeAtHome()),
+    )
+    return Sequence(
+        "measure the standard",
+        Retry(
+            Sequence[HandlingContext]("choose", LookForStandard(), ChooseStandard()),
+            LOOKS,
+            only={NO_STANDARD},
+        ),
+        Fallback(
+            "the standard",
+            Sequence("bend it", Turn(), grasped(settings), carry, measured()),
+            NoteFailure(),
+        ),
+        back,
+        LeaveStandard(),
+    )
 
 
 def build_transport(settings: HandlingSettings | None = None) -> Procedure[HandlingContext]:

@@ -34,6 +34,7 @@ from cosmic.autonomy.handling.put_away import (
 )
 from cosmic.autonomy.handling.reach import Turn
 from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.handling.standard import LookForStandard
 from cosmic.autonomy.handling.survey import Survey
 from cosmic.autonomy.handling.turning import FindRotationCentre
 from cosmic.autonomy.procedures.combinators import (
@@ -47,7 +48,7 @@ from cosmic.autonomy.procedures.combinators import (
 )
 from cosmic.autonomy.procedures.procedure import Part, Procedure
 from cosmic.autonomy.procedures.waits import Resource
-from cosmic.autonomy.shipped.bend_test import RELEASES, grasped, measured
+from cosmic.autonomy.shipped.bend_test import RELEASES, grasped, measured, one_standard
 from cosmic.autonomy.shipped.calibrate import calibrated
 
 ARMS = ("left", "right")
@@ -74,6 +75,21 @@ def build_ping_pong(settings: HandlingSettings | None = None) -> Procedure[Handl
     )
 
 
+def build_standard_in_turn(settings: HandlingSettings | None = None) -> Procedure[HandlingContext]:
+    """Return the procedure that bends the standard and puts it back, beside another arm."""
+    settings = settings or HandlingSettings()
+    return Procedure(
+        "standard",
+        Sequence(
+            "standard",
+            prepare(settings, LookForStandard()),
+            *_each(ClearAway()),
+            _as(ARMS[0], one_standard(settings, CarryInTurn(), Withdraw())),
+        ),
+        make_safe=make_safe,
+    )
+
+
 def _as(name: str, part: Part[HandlingContext]) -> Role[HandlingContext]:
     return Role(name, part, _arm(name))
 
@@ -90,7 +106,9 @@ def _arm(name: str) -> Callable[[HandlingContext], HandlingContext]:
     return arm
 
 
-def prepare(settings: HandlingSettings) -> Part[HandlingContext]:
+def prepare(
+    settings: HandlingSettings, survey: Part[HandlingContext] | None = None
+) -> Part[HandlingContext]:
     """Return what comes before the fibres; each arm has calibrations of its own."""
     first, second = ARMS
     return Sequence(
@@ -100,7 +118,7 @@ def prepare(settings: HandlingSettings) -> Part[HandlingContext]:
         *_each(ClearUp()),
         *_each(MakeReady()),
         *_each(Sequence("calibrate", *calibrated(settings), ClearAway())),
-        _as(first, Sequence("look", Survey(), FindRotationCentre())),
+        _as(first, Sequence("look", survey or Survey(), FindRotationCentre())),
         _as(second, SeeSides(first)),
         _as(first, SeeForce()),
     )

@@ -13,8 +13,8 @@ from typing_extensions import override
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.procedure import Procedure
-from cosmic.autonomy.shipped.bend_test import build_bend_test, build_transport
-from cosmic.autonomy.shipped.ping_pong import build_ping_pong
+from cosmic.autonomy.shipped.bend_test import build_bend_test, build_standard, build_transport
+from cosmic.autonomy.shipped.ping_pong import build_ping_pong, build_standard_in_turn
 from cosmic.frame.config import StrictModel
 from cosmic.frame.plugins import Backend, Kind, find_backend, names
 
@@ -32,11 +32,15 @@ class ShippedProcedure:
         A fibre without a result is no good one.
     arms : int
         How many fibres may be in work at a time.
+    standard : callable or None
+        Makes from the same parameters the procedure that bends the standard and puts it back;
+        None: a standard is not measured.
     """
 
     build: Callable[[Any], Procedure[HandlingContext]]
     measures: bool = True
     arms: int = 1
+    standard: Callable[[Any], Procedure[HandlingContext]] | None = None
 
 
 ProcedureBackend = Backend[None, ShippedProcedure]
@@ -98,6 +102,8 @@ def procedure_backend(
     return ProcedureBackend(lambda _options, _context: procedure, options=options)
 
 
-BEND_TEST: Final = procedure_backend(ShippedProcedure(build_bend_test))
-PING_PONG: Final = procedure_backend(ShippedProcedure(build_ping_pong, arms=2))
+BEND_TEST: Final = procedure_backend(ShippedProcedure(build_bend_test, standard=build_standard))
+PING_PONG: Final = procedure_backend(
+    ShippedProcedure(build_ping_pong, arms=2, standard=build_standard_in_turn)
+)
 TRANSPORT: Final = procedure_backend(ShippedProcedure(build_transport, measures=False))

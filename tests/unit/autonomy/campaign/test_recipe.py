@@ -6,6 +6,7 @@ import pytest
 
 from cosmic.autonomy.bending.plan import SpanLimits
 from cosmic.autonomy.campaign.recipe import load_recipe, shipped_recipes
+from cosmic.autonomy.handling.settings import StandardSettings
 from cosmic.autonomy.shipped.registry import PARAMETERS
 from cosmic.frame.config import StrictModel
 from cosmic.frame.errors import ConfigError
@@ -17,6 +18,7 @@ class Push(StrictModel):
 
 class Parameters(StrictModel):
     push: Push = Push()
+    standard: StandardSettings = StandardSettings()
 
 
 PROCEDURES: dict[str, type[StrictModel]] = {

@@ -10,7 +10,7 @@ from typing_extensions import override
 from cosmic.autonomy.handling import survey
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.plate import Jaws
-from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.handling.settings import HandlingSettings, StandardSettings
 from cosmic.autonomy.handling.survey import Choose, look
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.frame.clock import ManualClock
@@ -151,3 +151,40 @@ def test_a_plate_with_nothing_on_it_is_said_to_have_no_fibre():
     with pytest.raises(OperationFailed, match="the plate is empty") as failed:
         next(Choose().run(looked()))
     assert failed.value.cause == survey.NONE_LEFT
+
+
+def with_standard(*seen: Seen) -> Bench:
+    bench = Bench()
+    beam = StandardSettings(ei_n_m2=1.8e-10, length_um=2000.0, x_um=0.0, y_um=-3900.0)
+    bench.settings = bench.settings.model_copy(update={"standard": beam})
+    look(bench, list(seen))  # type: ignore[arg-type]
+    return bench
+
+
+STANDARD = {"length_um": 2000.0, "angle_deg": 0.0, "curl": 0.0005}
+
+
+def test_the_standard_is_known_by_position_length_and_straightness() -> None:
+    bench = with_standard(
+        Seen(100.0, -3850.0, **STANDARD),  # type: ignore[arg-type]
+        Seen(0.0, 500.0, **STANDARD),  # type: ignore[arg-type]
+        Seen(-100.0, -3500.0, length_um=1500.0, angle_deg=0.0),
+    )
+    assert bench.shared.standard is not None
+    assert bench.shared.standard.position_um == pytest.approx((100.0, -3850.0))
+    assert len(bench.shared.candidates) == 2
+
+
+def test_the_standard_is_never_taken_as_a_fibre_also_where_it_cannot_be_bent() -> None:
+    bench = with_standard(
+        Seen(0.0, -3900.0, **STANDARD),  # type: ignore[arg-type]
+        Seen(300.0, -3890.0, angle_deg=0.0),
+    )
+    assert bench.shared.standard is None
+    assert not bench.shared.candidates
+
+
+def test_without_a_certificate_a_straight_fibre_is_a_fibre() -> None:
+    bench = looked(Seen(0.0, -3900.0, **STANDARD))  # type: ignore[arg-type]
+    assert bench.shared.standard is None
+    assert len(bench.shared.candidates) == 1

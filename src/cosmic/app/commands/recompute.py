@@ -1,0 +1,78 @@
+"""``cosmic recompute``: the values of a campaign from its raw files alone, and what changed."""
+
+import argparse
+import sys
+import tomllib
+from pathlib import Path
+from typing import Final
+
+from cosmic.app.panels.campaign.output import gui_application, write_output
+from cosmic.autonomy.campaign.analysis import (
+    Analysis,
+    Comparison,
+    analyse,
+    compare,
+    finish,
+    settings_in,
+)
+from cosmic.autonomy.campaign.formatting import scale_words
+from cosmic.autonomy.campaign.recipe import RecipeFile, load_recipe
+from cosmic.autonomy.campaign.records import CampaignError
+from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store_read import CampaignReader
+
+CHANGED: Final = 3
+MOST_LINES: Final = 40
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Analyse a campaign anew and return the exit code: 3 where a number differs.
+
+    Raises
+    ------
+    CosmicError
+        The folder holds no campaign, a raw file is missing or was changed.
+    """
+    reader = CampaignReader(chosen.folder)
+    reader.check()
+    settings = None
+    if chosen.recipe is not None:
+        recipe = load_recipe(chosen.recipe)
+        settings = settings_in(recipe.text, str(recipe.path))
+    analysis = analyse(reader, settings)
+    found = compare(reader, analysis)
+    sys.stdout.write("\n".join(lines_of(found, analysis)) + "\n")
+    if chosen.apply:
+        _apply(chosen.folder, analysis)
+    return CHANGED if found.changed else 0
+
+
+def _apply(folder: Path, analysis: Analysis) -> None:
+    application = gui_application()  # noqa: F841 - Qt forgets one that nobody holds
+    store = CampaignStore.open(folder, run=False)
+    try:
+        if finish(store, analysis.settings) is None:
+            raise CampaignError(f"{folder}: nothing was measured there")
+    finally:
+        store.close()
+    wanted = RecipeFile.model_validate(tomllib.loads(store.reader.info().recipe_text)).output
+    for path in write_output(folder, wanted):
+        sys.stdout.write(f"{path}\n")
+
+
+def lines_of(found: Comparison, analysis: Analysis) -> list[str]:
+    """Return what is said of an analysis beside the record."""
+    lines = [f"{found.compared} values computed from raw files: {len(found.changed)} changed"]
+    for each in found.changed[:MOST_LINES]:
+        trust = ""
+        if each.trusted_before != each.trusted_now:
+            trust = ", trusted now" if each.trusted_now else ", no longer trusted"
+        lines.append(
+            f"  fibre {each.number}: {each.before_n_m2:.6g} -> {each.now_n_m2:.6g} N m2 "
+            f"({each.percent:+.3f} %){trust}"
+        )
+    if len(found.changed) > MOST_LINES:
+        lines.append(f"  and {len(found.changed) - MOST_LINES} more")
+    lines += [f"another version: {each}" for each in found.versions]
+    lines.append(f"scale of the force: {scale_words(analysis.scale)}")
+    return lines

@@ -1,0 +1,318 @@
+"""The final values of a campaign, from its raw files alone: at its end, and when it is asked."""
+
+import hashlib
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Final
+
+import cosmic.autonomy.bending
+from cosmic.autonomy.bending.fit import assess_campaign, in_time, measure_fibre
+from cosmic.autonomy.bending.result import BendingResult
+from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.autonomy.bending.standards import ForceScale, StandardReading
+from cosmic.autonomy.campaign.records import STANDARD, CampaignError, FibreRecord
+from cosmic.autonomy.campaign.storage_format import FINAL, RawFibre, fitted_file, read_raw
+from cosmic.autonomy.campaign.store import CampaignStore, write_whole
+from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.autonomy.handling.push import certificate_of
+from cosmic.autonomy.handling.settings import StandardSettings
+from cosmic.frame.config import check_model
+from cosmic.frame.errors import ConfigError
+from cosmic.frame.version import __version__
+
+SAME: Final = 1e-6
+"""Of a value: what differs by less is the same number, rounded otherwise."""
+
+
+@dataclass(frozen=True, slots=True)
+class AnalysisSettings:
+    """What an analysis is told of instrument and standard."""
+
+    fit: FitSettings
+    standard: StandardSettings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Analysis:
+    """A campaign as it was analysed.
+
+    Attributes
+    ----------
+    results : mapping of int to BendingResult
+        By the number of the fibre, or of the measurement of the standard.
+    scale : ForceScale
+        How the scale of the force is known.
+    settings : AnalysisSettings
+    versions : mapping
+        By which program.
+    """
+
+    results: Mapping[int, BendingResult]
+    scale: ForceScale
+    friction: float
+    settings: AnalysisSettings
+    versions: Mapping[str, str]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what goes into the record beside the results."""
+        return {
+            "made": datetime.now().astimezone().isoformat(timespec="seconds"),
+            "versions": dict(self.versions),
+            "fit": self.settings.fit.model_dump(),
+            "standard": self.settings.standard.model_dump(mode="json"),
+            "scale": _finite(asdict(self.scale)),
+            "friction": self.friction,
+        }
+
+
+@cache
+def analysis_version() -> Mapping[str, str]:
+    """Return by what values are made: CoSMic, the source of its analysis, and what that uses."""
+    digest = hashlib.sha256()
+    for folder in cosmic.autonomy.bending.__path__:
+        for file in sorted(Path(folder).glob("*.py")):
+            digest.update(file.read_bytes())
+    return {
+        "CoSMic": __version__,
+        "analysis": digest.hexdigest()[:16],
+        "numpy": metadata.version("numpy"),
+        "scipy": metadata.version("scipy"),
+    }
+
+
+def settings_of(reader: CampaignReader) -> AnalysisSettings:
+    """Return what the campaign was analysed with; what its recipe says, before it ever was.
+
+    Defaults of that time count, not those of today.
+
+    Raises
+    ------
+    CampaignError
+        This program does not know a setting that was used.
+    """
+    kept = reader.analysis()
+    if not kept:
+        return settings_in(reader.info().recipe_text)
+    return _checked(kept["fit"], kept["standard"], str(reader.folder))
+
+
+def settings_in(recipe_text: str, name: str = "the recipe") -> AnalysisSettings:
+    """Return what a recipe says of instrument and standard.
+
+    Raises
+    ------
+    CampaignError
+        It is no recipe, or one that this program does not understand.
+    """
+    try:
+        parameters = tomllib.loads(recipe_text).get("parameters", {})
+    except tomllib.TOMLDecodeError as exc:
+        raise CampaignError(f"{name} cannot be read: {exc}") from exc
+    fit = parameters.get("push", {}).get("fit", {})
+    return _checked(fit, parameters.get("standard", {}), name)
+
+
+def _checked(fit: Mapping[str, Any], standard: Mapping[str, Any], name: str) -> AnalysisSettings:
+    try:
+        return AnalysisSettings(
+            check_model(name, dict(fit), FitSettings, under="push.fit"),
+            check_model(name, dict(standard), StandardSettings, under="standard"),
+        )
+    except ConfigError as exc:
+        raise CampaignError(f"this program cannot analyse with these settings: {exc}") from exc
+
+
+def analyse(
+    reader: CampaignReader, settings: AnalysisSettings | None = None, *, check: bool = True
+) -> Analysis:
+    """Return final values of a campaign, from its raw files alone.
+
+    Parameters
+    ----------
+    settings : AnalysisSettings, optional
+        Those that the campaign was analysed with, if None.
+    check : bool
+        Refuse raw files that are not as they were written.
+
+    Raises
+    ------
+    CampaignError
+        A raw file is missing, was changed, or the settings are not understood.
+    """
+    settings = settings or settings_of(reader)
+    raw = [each for each in _raw(reader, check=check) if each.assessed and each.spans]
+    standard = certificate_of(settings.standard) if settings.standard.ei_n_m2 > 0.0 else None
+    raw = [each for each in raw if each.role != STANDARD or standard is not None]
+    measured = in_time(
+        [
+            measure_fibre(
+                each.spans,
+                settings=settings.fit.model_copy(
+                    update={"fibre_width_um": _width_um(each, settings)}
+                ),
+                certificate=standard if each.role == STANDARD else None,
+            )
+            for each in raw
+        ],
+        [each.elapsed_s for each in raw],
+    )
+    pairs = list(zip(raw, measured, strict=True))
+    fibres = [pair for pair in pairs if pair[0].role != STANDARD]
+    standards = [pair for pair in pairs if pair[0].role == STANDARD]
+    found = assess_campaign(
+        [each for _, each in fibres],
+        standards=[each for _, each in standards],
+        settings=settings.fit,
+    )
+    numbers = [each.number for each, _ in (*fibres, *standards)]
+    results = dict(zip(numbers, (*found.fibres, *found.standards), strict=True))
+    return Analysis(results, found.scale, found.friction, settings, analysis_version())
+
+
+def _width_um(raw: RawFibre, settings: AnalysisSettings) -> float:
+    return settings.standard.width_um if raw.role == STANDARD else raw.width_um
+
+
+def _raw(reader: CampaignReader, *, check: bool) -> list[RawFibre]:
+    found = []
+    for path, sha256 in reader.raw_files().values():
+        if check and sha256:
+            try:
+                now = hashlib.sha256(path.read_bytes()).hexdigest()
+            except OSError as exc:
+                raise CampaignError(f"{path} cannot be read: {exc.strerror or exc}") from exc
+            if now != sha256:
+                raise CampaignError(f"{path} is not as it was written: its SHA-256 differs")
+        found.append(read_raw(path))
+    return found
+
+
+def finish(store: CampaignStore, settings: AnalysisSettings | None = None) -> Analysis | None:
+    """Put the final values of a campaign into its record; None where nothing was measured.
+
+    Raises
+    ------
+    CampaignError
+        A raw file is missing or was changed, or the record cannot be written.
+    """
+    reader = store.reader
+    analysis = analyse(reader, settings or settings_in(reader.info().recipe_text))
+    if not analysis.results:
+        return None
+    fitted = {
+        number: [each.fitted_un for each in result.spans]
+        for number, result in analysis.results.items()
+    }
+    write_whole(store.folder / FINAL, fitted_file(fitted))
+    store.keep_analysis(analysis.results, analysis.as_json())
+    return analysis
+
+
+def scale_in(kept: Mapping[str, Any]) -> ForceScale | None:
+    """Return how the scale of the force is known by the analysis that is in a record."""
+    if not kept:
+        return None
+    scale = dict(kept["scale"])
+    readings = tuple(
+        StandardReading(**{key: _number(value) for key, value in each.items()})
+        for each in scale.pop("standards")
+    )
+    reasons = tuple(scale.pop("reasons"))
+    return ForceScale(**scale, standards=readings, reasons=reasons)
+
+
+def _finite(value: object) -> object:
+    """Return the same without nan, which JSON does not know."""
+    if isinstance(value, Mapping):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, tuple | list):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _number(value: object) -> Any:
+    return math.nan if value is None else value
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What an analysis makes otherwise of a fibre than its record has it."""
+
+    number: int
+    before_n_m2: float
+    now_n_m2: float
+    trusted_before: bool
+    trusted_now: bool
+
+    @property
+    def percent(self) -> float:
+        """By how much the value changed."""
+        return 100.0 * (self.now_n_m2 / self.before_n_m2 - 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """An analysis beside the record.
+
+    Attributes
+    ----------
+    compared : int
+        Values that were compared.
+    changed : tuple of Change
+        Those whose value, interval or trust differs.
+    versions : tuple of str
+        What of the program is another one than then, in words.
+    scale_percent : float
+        By how much the sensor's scale is taken to be another one.
+    """
+
+    compared: int
+    changed: tuple[Change, ...]
+    versions: tuple[str, ...]
+    scale_percent: float
+
+
+def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
+    """Return what an analysis changes of what stands in the record."""
+    kept = reader.analysis()
+    before = kept.get("versions", {})
+    versions = tuple(
+        f"{name} {before.get(name, 'unknown')} then, {now} now"
+        for name, now in analysis.versions.items()
+        if before.get(name) != now
+    )
+    scale = scale_in(kept)
+    off = 0.0 if scale is None else scale.off_part
+    records = {each.number: each for each in (*reader.finished(), *reader.fibres(STANDARD))}
+    pairs = [(records[number], result) for number, result in analysis.results.items()]
+    changed = tuple(
+        change for record, result in pairs if (change := _change(record, result)) is not None
+    )
+    return Comparison(len(pairs), changed, versions, 100.0 * (analysis.scale.off_part - off))
+
+
+def _change(record: FibreRecord, now: BendingResult) -> Change | None:
+    before = record.bending
+    if before is None:
+        return Change(record.number, math.nan, now.ei_n_m2, False, now.trusted)
+    pairs = (
+        (before.ei_n_m2, now.ei_n_m2),
+        (before.ei_low_n_m2, now.ei_low_n_m2),
+        (before.ei_high_n_m2, now.ei_high_n_m2),
+    )
+    same = all(_same(*pair) for pair in pairs) and before.trusted == now.trusted
+    if same:
+        return None
+    return Change(record.number, before.ei_n_m2, now.ei_n_m2, before.trusted, now.trusted)
+
+
+def _same(one: float, other: float) -> bool:
+    if math.isnan(one) or math.isnan(other):
+        return math.isnan(one) == math.isnan(other)
+    return math.isclose(one, other, rel_tol=SAME)

@@ -1,0 +1,131 @@
+"""What standards say of the scale of the force, in sealed sessions that share nothing with it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from cosmic.autonomy.bending.curved import NaturalShape
+from cosmic.autonomy.bending.fit import (
+    Certificate,
+    MeasuredFibre,
+    assess_campaign,
+    half_width_percent,
+    in_time,
+    measure_fibre,
+)
+from cosmic.autonomy.bending.plan import plan_spans
+from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.bending.standards import ForceScale
+from oracles.sealed_session import STANDARD_EI, Fibre, Session, World, pushes
+
+SCALE = 1e-18
+SETTINGS = FitSettings()
+CERTIFICATE = Certificate(STANDARD_EI * SCALE, 0.02)
+WORLD = World(
+    noise_un=0.03,
+    friction=(0.2, 0.2),
+    clamp=("log", 12.0, 0.3),
+    jaw_un_um=(1500.0, 0.0),
+    probe_side_un_um=10.0,
+)
+
+
+def measured(
+    session: Session, beam: Fibre, certificate: Certificate | None = None
+) -> MeasuredFibre:
+    plan = plan_spans(min(beam.free_um, 900.0), beam.ei * SCALE)
+    line = beam.line()
+    spans = [
+        Span(
+            nominal_um=each.place_um,
+            probe_x_um=each.place_um,
+            hold_x_um=0.0,
+            way_um=each.way_um,
+            force_un=each.force_un,
+            force_std_un=each.std_un,
+            time_s=each.time_s,
+            loading=each.loading,
+            shape=NaturalShape(line[:, 0], line[:, 1], each.place_um),
+        )
+        for each in pushes(session, beam, [(one.span_um, one.stroke_um) for one in plan])
+    ]
+    return measure_fibre(spans, settings=SETTINGS, certificate=certificate)
+
+
+def scale_of(*gains: float, certificate: Certificate = CERTIFICATE, seed: int = 5) -> ForceScale:
+    """Return what standards measured with these gains, evenly over a campaign, say."""
+    session = Session(WORLD, np.random.default_rng(seed))
+    beam, standards = Fibre.standard(session), []
+    for gain in gains:
+        session.gain = gain
+        standards.append(measured(session, beam, certificate))
+    standards = in_time(standards, [float(n) for n in range(len(gains))])
+    return assess_campaign([], standards=standards, settings=SETTINGS).scale
+
+
+@pytest.mark.parametrize("gain", [0.93, 1.0, 1.07])
+def test_a_wrong_gain_is_found_with_its_uncertainty(gain: float) -> None:
+    scale = scale_of(gain, gain, gain)
+    assert scale.verified
+    assert scale.off_part == pytest.approx(gain - 1.0, abs=2.2 * scale.off_std_part)
+    assert 0.008 < scale.off_std_part < 0.025
+    assert [each.refused for each in scale.standards] == ["", "", ""]
+
+
+def test_a_gain_far_from_the_sensors_certificate_is_believed_and_said_aloud() -> None:
+    scale = scale_of(1.12, 1.12, 1.12)
+    assert scale.verified
+    assert scale.off_part == pytest.approx(0.12, abs=0.03)
+    assert "contradicts the sensor's certificate" in "".join(scale.reasons)
+
+
+def test_a_drift_larger_than_foreseen_is_followed() -> None:
+    scale = scale_of(1.0, 1.05, 1.10)
+    assert scale.verified
+    assert scale.drift_part == pytest.approx(0.10, abs=0.03)
+    assert "drifts by" in "".join(scale.reasons)
+
+
+def test_standards_that_contradict_each_other_verify_nothing() -> None:
+    scale = scale_of(1.0, 1.25, 1.0)
+    assert not scale.verified
+    assert "contradict each other" in "".join(scale.reasons)
+
+
+def test_a_beam_of_another_stiffness_is_refused_as_a_standard() -> None:
+    scale = scale_of(1.0, certificate=Certificate(2.0 * STANDARD_EI * SCALE, 0.02))
+    assert not scale.verified
+    assert "another beam" in "".join(scale.reasons)
+    assert scale.off_std_part == pytest.approx(0.025, rel=0.1)
+
+
+def test_a_drifting_gain_is_put_right_in_every_fibre() -> None:
+    session = Session(WORLD, np.random.default_rng(11))
+    beam = Fibre.standard(session)
+    fibre = dataclasses.replace(Fibre.drawn(session), ei=5e7)
+    kept, times = [], []
+    for time_s, one, certificate in (
+        (0.0, beam, CERTIFICATE),
+        (100.0, fibre, None),
+        (500.0, beam, CERTIFICATE),
+        (900.0, fibre, None),
+        (1000.0, beam, CERTIFICATE),
+    ):
+        session.gain = 1.0 + 0.08 * time_s / 1000.0
+        kept.append(measured(session, one, certificate))
+        times.append(time_s)
+    kept = in_time(kept, times)
+    found = assess_campaign(
+        [kept[1], kept[3]], standards=[kept[0], kept[2], kept[4]], settings=SETTINGS
+    )
+    alone = assess_campaign([kept[1], kept[3]], settings=SETTINGS)
+    true = fibre.true_ei(600.0) * SCALE
+    for each, without in zip(found.fibres, alone.fibres, strict=True):
+        assert each.scale_verified
+        assert each.ei_low_n_m2 < true < each.ei_high_n_m2
+        assert half_width_percent(each) < half_width_percent(without)
+    drifted = alone.fibres[1].ei_n_m2 / alone.fibres[0].ei_n_m2
+    right = found.fibres[1].ei_n_m2 / found.fibres[0].ei_n_m2
+    assert abs(right - 1.0) < 0.5 * abs(drifted - 1.0)

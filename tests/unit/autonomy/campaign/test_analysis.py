@@ -1,0 +1,181 @@
+"""Final values come from the raw files alone: the same again, or it is said what changed."""
+
+import dataclasses
+import math
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from cosmic.app.cli import main
+from cosmic.autonomy.campaign.analysis import analyse, compare, finish, scale_in, settings_in
+from cosmic.autonomy.campaign.records import STANDARD, CampaignError, Outcome, Shape
+from cosmic.autonomy.campaign.report import write_report
+from cosmic.autonomy.campaign.stop_rule import StandardSchedule
+from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store_read import CampaignReader
+from unit.autonomy.campaign.sample_records import INFO, good
+
+STANDARD_EI = 1.8e-10
+RECIPE = f"""
+procedure = "bend test"
+[stop]
+count = 2
+[parameters.standard]
+ei_n_m2 = {STANDARD_EI}
+[output]
+html = false
+pdf = false
+"""
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A campaign of two fibres between two measurements of the standard."""
+    folder = tmp_path_factory.mktemp("analysed") / "campaign"
+    info = dataclasses.replace(INFO, recipe_text=RECIPE)
+    with CampaignStore.create(folder, info) as store:
+        order = (
+            (STANDARD, STANDARD_EI),
+            ("fibre", 5e-11),
+            ("fibre", 3e-11),
+            (STANDARD, STANDARD_EI),
+        )
+        for n, (role, ei) in enumerate(order):
+            number = store.begin_fibre(time_s=100.0 * n, role=role)
+            record = good(number, ei_n_m2=ei, seed=n)
+            store.finish_fibre(
+                dataclasses.replace(record, role=role, elapsed_s=100.0 * n, images=())
+            )
+        finish(store)
+    return folder
+
+
+def copied(campaign: Path, folder: Path) -> Path:
+    folder.mkdir()
+    for each in campaign.rglob("*"):
+        if each.is_file() and each.name != "campaign.lock":
+            target = folder / each.relative_to(campaign)
+            target.parent.mkdir(exist_ok=True)
+            target.write_bytes(each.read_bytes())
+    return folder
+
+
+def test_a_standard_is_no_fibre_of_the_sample(campaign: Path) -> None:
+    reader = CampaignReader(campaign)
+    assert [each.number for each in reader.fibres()] == [2, 3]
+    assert [each.number for each in reader.fibres(STANDARD)] == [1, 4]
+    assert [each.number for each in reader.finished()] == [2, 3]
+
+
+def test_the_scale_of_the_record_comes_from_the_standard(campaign: Path, tmp_path: Path) -> None:
+    reader = CampaignReader(campaign)
+    scale = scale_in(reader.analysis())
+    assert scale is not None
+    assert scale.verified
+    assert abs(scale.off_part) < 2.5 * scale.off_std_part < 0.06
+    assert all(each.bending.scale_verified for each in reader.finished() if each.bending)
+    write_report(reader, tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert "verified by a standard, measured 2 times: the sensor reads" in page
+    assert "<h2>Standard</h2>" in page
+
+
+def test_the_raw_files_alone_give_the_same_numbers_again(campaign: Path) -> None:
+    reader = CampaignReader(campaign)
+    found = compare(reader, analyse(reader))
+    assert found.compared == 4
+    assert not found.changed
+    assert not found.versions
+
+
+def test_the_command_ends_with_0_for_the_same_and_with_3_for_other_numbers(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["recompute", str(campaign)]) == 0
+    assert "4 values computed from raw files: 0 changed" in capsys.readouterr().out
+    other = tmp_path / "other.toml"
+    other.write_text(RECIPE.replace("e-10", "e-10\nexpanded_percent = 8.0"), "utf-8")
+    assert main(["recompute", str(campaign), "--recipe", str(other)]) == 3
+    assert "fibre 2: 4." in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("qapp")
+def test_new_values_are_put_into_the_record_when_wanted(campaign: Path, tmp_path: Path) -> None:
+    folder, other = copied(campaign, tmp_path / "copy"), tmp_path / "other.toml"
+    other.write_text(f"{RECIPE}\n[parameters.push.fit]\nfriction_std = 0.4\n", "utf-8")
+    before = [each.bending for each in CampaignReader(folder).finished()]
+    assert main(["recompute", str(folder), "--recipe", str(other), "--apply"]) == 3
+    after = [each.bending for each in CampaignReader(folder).finished()]
+    assert all(
+        one is not None and other is not None and one.ei_high_n_m2 != other.ei_high_n_m2
+        for one, other in zip(before, after, strict=True)
+    )
+    assert main(["recompute", str(folder)]) == 0
+    assert not CampaignReader(folder).cut_off()
+
+
+def test_a_raw_file_that_was_changed_is_refused(campaign: Path, tmp_path: Path) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    file = folder / "fibres" / "00002.h5"
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(bytes(content))
+    with pytest.raises(CampaignError, match=r"00002\.h5 is not as it was written: its SHA-256"):
+        analyse(CampaignReader(folder))
+    file.unlink()
+    with pytest.raises(CampaignError, match=r"00002\.h5 cannot be read"):
+        analyse(CampaignReader(folder))
+
+
+def test_another_version_of_the_analysis_is_named(campaign: Path, tmp_path: Path) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute(
+            "UPDATE campaign SET analysis_json = "
+            "json_set(analysis_json, '$.versions.analysis', 'x')"
+        )
+    base.close()
+    reader = CampaignReader(folder)
+    (other,) = compare(reader, analyse(reader)).versions
+    assert other.startswith("analysis x then, ")
+
+
+def test_defaults_of_then_count_and_not_those_of_today(campaign: Path, tmp_path: Path) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute(
+            "UPDATE campaign SET analysis_json = json_set(analysis_json, '$.fit.friction', 0.31)"
+        )
+    base.close()
+    assert analyse(CampaignReader(folder)).settings.fit.friction == 0.31
+    assert settings_in(RECIPE).fit.friction != 0.31
+
+
+def test_a_fibre_that_is_not_trusted_in_the_end_is_no_good_one(tmp_path: Path) -> None:
+    with CampaignStore.create(tmp_path, INFO) as store:
+        number = store.begin_fibre(time_s=0.0)
+        record = good(number)
+        soft = settings_in("[parameters.push.fit]\nsoft_percent = 0.1")
+        store.finish_fibre(dataclasses.replace(record, elapsed_s=0.0, shape=Shape(width_um=30.0)))
+        assert store.reader.fibre(number).outcome is Outcome.GOOD
+        finish(store, soft)
+    (after,) = CampaignReader(tmp_path).finished()
+    assert after.outcome is Outcome.DOUBTFUL
+    assert after.cause == "not trusted"
+    assert "the interval is" in after.text
+
+
+def test_the_standard_is_due_at_begin_middle_and_end() -> None:
+    due = StandardSchedule(("begin", "middle", "end"))
+    assert due.due(0.9, ending=True) == "begin"
+    due.done("begin")
+    assert not due.due(0.4, ending=False)
+    assert not due.due(math.nan, ending=False)
+    assert due.due(0.5, ending=False) == "middle"
+    due.done("middle")
+    assert not due.due(0.9, ending=False)
+    assert due.due(0.9, ending=True) == "end"
+    due.done("end")
+    assert not due.due(1.0, ending=True)
+    assert not StandardSchedule(()).due(0.0, ending=True)
