@@ -1,6 +1,8 @@
 """The window by task: what each workspace shows at each size, and that nothing is cut off."""
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 
@@ -249,6 +251,21 @@ def test_the_force_is_shown_with_its_limit_and_greyed_when_it_is_not_measured(
     assert "not measured" in force.title.text()
 
 
+def test_a_change_of_theme_costs_much_less_than_all_rules_looked_for_again(
+    whole: OperatorWindow, qtbot: QtBot, qapp: QApplication
+) -> None:
+    choose(whole, qtbot, MEASURE)
+
+    def cost_s(change: Callable[[], object]) -> float:
+        begun = time.thread_time()
+        change()
+        return time.thread_time() - begun
+
+    fast = min(cost_s(partial(whole.set_theme, name)) for name in ("light", "dark", "light"))
+    slow = min(cost_s(lambda: qapp.setStyleSheet(qapp.styleSheet())) for _ in range(2))
+    assert fast < 0.6 * slow
+
+
 def test_a_layout_is_kept_by_name_and_reset(make: Make, qtbot: QtBot, stored: QSettings) -> None:
     window = make(applications=("mico", "daqco", "vico"), hardware=False)
     spaces = window.workspaces
@@ -313,15 +330,62 @@ def test_a_named_recording_takes_three_actions_and_its_slope_is_read_with_two_mo
 
     hand = Actions(qtbot)
     hand.click(buttons.buttons["Results"])
-    found = tasks(whole).results.list
-    item = found.topLevelItem(0)
+    results = tasks(whole).results
+    found = results.sessions.list
+    qtbot.waitUntil(lambda: results.sessions.row_of("soft pulp") is not None)
+    item = results.sessions.row_of("soft pulp")
     assert item is not None
-    assert item.text(0).startswith("soft pulp")
     hand.count += 1
-    place = found.visualItemRect(item).center()
-    qtbot.mouseClick(found.viewport(), LEFT, pos=place)
+    qtbot.mouseClick(found.viewport(), LEFT, pos=found.visualItemRect(item).center())
     assert hand.count <= 6
-    assert "slope" in tasks(whole).results.slope.text()
+    qtbot.waitUntil(lambda: "slope" in results.viewer.slope.text())
+
+
+def test_the_log_lies_beside_what_was_recorded(
+    whole: OperatorWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tasks(whole).folder, "_folder", tmp_path)
+    monkeypatch.setattr(tasks(whole).folder, "home", tmp_path)
+    choose(whole, qtbot, MEASURE)
+    force = tasks(whole).force
+    assert force is not None
+    qtbot.waitUntil(force.record.isEnabled)
+    qtbot.mouseClick(force.record, LEFT)
+    qtbot.waitUntil(lambda: force.record.isChecked())
+    daqco = whole.platform.daqco
+    assert daqco is not None
+    qtbot.waitUntil(lambda: daqco.recorder.state.duration_s > 0.5)
+    qtbot.mouseClick(force.record, LEFT)
+    qtbot.waitUntil(lambda: "written" in force.message.text())
+    choose(whole, qtbot, "Results")
+    results = tasks(whole).results
+    qtbot.waitUntil(lambda: results.sessions.row_of("push") is not None)
+    item = results.sessions.row_of("push")
+    assert item is not None
+    place = results.sessions.list.visualItemRect(item).center()
+    qtbot.mouseClick(results.sessions.list.viewport(), LEFT, pos=place)
+    qtbot.waitUntil(lambda: results.viewer.pictures.scene is not None)
+    assert (tmp_path / "log.tsv").read_text().startswith("time_s\tutc")
+
+
+def test_a_change_of_theme_reaches_what_is_shown_and_what_is_shown_later(
+    whole: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(whole, qtbot, MEASURE)
+    whole.set_theme("light")
+    qtbot.wait(50)
+    ground = whole.grab().toImage().pixelColor(whole.width() - 30, whole.height() - 60)
+    assert ground.lightness() > 200
+    whole.set_theme("dark")
+    for name in (SET_UP, "Results", MEASURE):
+        choose(whole, qtbot, name)
+        image = whole.grab().toImage()
+        shades = [
+            image.pixelColor(x, y).lightness()
+            for x in range(4, whole.width(), 40)
+            for y in range(70, whole.height(), 40)
+        ]
+        assert sum(shade > 200 for shade in shades) < 0.05 * len(shades), name
 
 
 def test_a_force_limit_is_set_by_three_actions(whole: OperatorWindow, qtbot: QtBot) -> None:

@@ -238,6 +238,7 @@ class OperatorWindow(CosmicServerGui):
         below = Qt.DockWidgetArea.BottomDockWidgetArea
         if self._tasks is not None:
             self.drawer.add_page(LOG_TITLE, LogPanel(ring), "What happened, line by line")
+            self._tasks.keep_log(ring)
         else:
             self.add_panel(LOG_TITLE, LogPanel(ring), below, scroll=False)
         if console:
@@ -468,6 +469,8 @@ class OperatorWindow(CosmicServerGui):
             self._calibrations.made.shut_down()
         if self._procedures is not None:
             self._procedures.shut_down()
+        if self._tasks is not None:
+            self._tasks.shut_down()
         self._rig.close()
         if self._console is not None:
             self._console.shut_down()

@@ -1,26 +1,26 @@
 """The operator's window by task: six workspaces around one picture, with coach and drawer."""
 
-from collections.abc import Callable
-from datetime import datetime
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import QObject, QSettings, QStandardPaths, QTimer
+from PySide6.QtCore import QObject, QSettings, QTimer
 from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from cosmic.app.panels.alarms import AlarmBook, AlarmPanel, Level
 from cosmic.app.panels.calibrations import CALIBRATIONS
-from cosmic.app.panels.campaign.dock import CAMPAIGN
+from cosmic.app.panels.campaign.dock import CAMPAIGN, campaigns_folder
 from cosmic.app.panels.coach import Coach, Rule
 from cosmic.app.panels.force import ForcePanel
 from cosmic.app.panels.history import HistoryPanel
 from cosmic.app.panels.image_bar import ImageBar
 from cosmic.app.panels.instruments import DAQCO, LENS, Instruments
 from cosmic.app.panels.procedures import CONTROL, TELEOPERATION, TRAJECTORIES
-from cosmic.app.panels.results import ResultsPanel
+from cosmic.app.panels.results.panel import ResultsPanel
 from cosmic.app.panels.scene import ScenePanel
 from cosmic.app.panels.tool import ToolPanel
 from cosmic.app.platform import Platform
+from cosmic.app.results.session_log import SessionLog
+from cosmic.app.results.sessions import SessionFolder
 from cosmic.app.rig import Rig
 from cosmic.app.windows.stage import Stage, column_of
 from cosmic.frame.failure import Failure
@@ -28,6 +28,8 @@ from cosmic.frame.gui.clearance_meter import closeness
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.gui.workspaces import Area, Place, Workspace
+from cosmic.frame.log import RingBufferHandler
+from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.vico.gui.camera_view import CameraParts
 
@@ -112,20 +114,6 @@ def workspaces(others: tuple[str, ...] = ()) -> tuple[Workspace, ...]:
     )
 
 
-class SessionFolder:
-    """The folder of one session's files in the user's documents; made when the first is written."""
-
-    def __init__(self, now: Callable[[], datetime] = datetime.now) -> None:
-        place = QStandardPaths.StandardLocation.DocumentsLocation
-        self.home = Path(QStandardPaths.writableLocation(place)) / "CoSMic" / "sessions"
-        self._folder = self.home / f"{now():%Y-%m-%d_%H-%M}"
-
-    def __call__(self) -> Path:
-        """Return it, made now if need be; raises `OSError`."""
-        self._folder.mkdir(parents=True, exist_ok=True)
-        return self._folder
-
-
 class TaskLayout(QObject):
     """Makes what the workspaces need beside the panels there are, and joins them; GUI thread.
 
@@ -165,8 +153,9 @@ class TaskLayout(QObject):
         self.stage.set_bar(self.bar)
         self.tool = ToolPanel(gui)
         self.force = ForcePanel(rig.daqco, gui, self.folder) if instruments.force else None
-        self.results = ResultsPanel(self._folders)
+        self.results = ResultsPanel(self._folders, platform.policy, self._model)
         self.book = AlarmBook(self)
+        self._log: SessionLog | None = None
         self._add_panels()
         others = tuple(each.title for each in platform.others.values())
         window.use_workspaces(workspaces(others), self.stage)
@@ -203,6 +192,18 @@ class TaskLayout(QObject):
         if made is not None:
             made.add_dock(dock)
         return coach
+
+    def keep_log(self, ring: RingBufferHandler) -> None:
+        """Keep the log beside what is recorded, from the first recording on."""
+        self._log = SessionLog(ring, self._platform.clock)
+        self.folder.on_made = self._log.begin
+
+    def shut_down(self) -> None:
+        """End what goes on here; before the window goes."""
+        self._watch.stop()
+        self.results.shut_down()
+        if self._log is not None:
+            self._log.close()
 
     def _add_drawer(self) -> None:
         drawer = self._window.drawer
@@ -270,9 +271,17 @@ class TaskLayout(QObject):
         if isinstance(path, Path):
             self._window.drawer.line.set_text(f"written: {path}")
 
+    def _model(self) -> SceneModel | None:
+        return self._gui.mico.application.scene
+
     def _folders(self) -> tuple[Path, ...]:
-        own = () if self._force_remote() else (self._rig.daqco.directory,)
-        return (self.folder.home, *own) if self.force is not None else (self.folder.home,)
+        """Return where recordings are looked for."""
+        found = [self.folder.home, campaigns_folder()]
+        if not self._force_remote():
+            found.append(self._rig.daqco.directory)
+        views = self._images.cameras.values()
+        found += [each.camera.directory for each in views if not each.camera.remote]
+        return tuple(dict.fromkeys(found))
 
     def _force_remote(self) -> bool:
         return self.force is None or bool(self._rig.daqco.remote)

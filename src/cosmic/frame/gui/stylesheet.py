@@ -1,11 +1,13 @@
-"""The style sheets: of the theme, made from a palette, and of printed pages."""
+"""The style sheets: of all themes, in the roles of a palette, and of printed pages."""
 
-from dataclasses import asdict
+import re
 from pathlib import Path
 from string import Template
 from typing import Final
 
-from cosmic.frame.gui.palette import INK, OKABE_ITO, Palette
+from PySide6.QtGui import QPalette
+
+from cosmic.frame.gui.palette import DARK, INK, OKABE_ITO
 
 _ASSETS: Final = Path(__file__).parent / "assets"
 
@@ -56,9 +58,9 @@ QComboBox:focus, QAbstractSpinBox:focus { border-color: $accent; }
 QComboBox:disabled, QAbstractSpinBox:disabled { background: transparent; color: $disabled; }
 QComboBox::drop-down { border: none; width: 22px; }
 QComboBox::down-arrow, QAbstractSpinBox::down-arrow {
-    image: url("$assets/down-$name.svg"); width: 10px; height: 10px;
+    image: url("$assets/down.svg"); width: 10px; height: 10px;
 }
-QAbstractSpinBox::up-arrow { image: url("$assets/up-$name.svg"); width: 10px; height: 10px; }
+QAbstractSpinBox::up-arrow { image: url("$assets/up.svg"); width: 10px; height: 10px; }
 QAbstractSpinBox::up-button, QAbstractSpinBox::down-button { border: none; width: 20px; }
 QAbstractSpinBox::up-button:hover, QAbstractSpinBox::down-button:hover { background: $hover; }
 QComboBox QAbstractItemView {
@@ -72,7 +74,7 @@ QCheckBox::indicator, QGroupBox::indicator {
 }
 QCheckBox::indicator:hover { border-color: $accent; }
 QCheckBox::indicator:checked, QGroupBox::indicator:checked {
-    background: $accent; border-color: $accent; image: url("$assets/check-$name.svg");
+    background: $accent; border-color: $accent; image: url("$assets/check.svg");
 }
 QCheckBox::indicator:disabled { background: transparent; border-color: $border; }
 QCheckBox::indicator:checked:disabled {
@@ -244,12 +246,41 @@ pre { background-color: #f3f5f7; font-size: 10px; } small { font-size: 9px; }
 """Of a printed report: black on white in every theme."""
 
 
-def stylesheet(palette: Palette) -> str:
-    """Return the style sheet in the colours of `palette`."""
+ROLES: Final = {
+    "window": QPalette.ColorRole.Shadow,
+    "panel": QPalette.ColorRole.Window,
+    "raised": QPalette.ColorRole.Button,
+    "hover": QPalette.ColorRole.Light,
+    "field": QPalette.ColorRole.Base,
+    "border": QPalette.ColorRole.Mid,
+    "border_strong": QPalette.ColorRole.Dark,
+    "text": QPalette.ColorRole.Text,
+    "dim": QPalette.ColorRole.PlaceholderText,
+    "disabled": QPalette.ColorRole.Midlight,
+    "accent": QPalette.ColorRole.Highlight,
+    "on_accent": QPalette.ColorRole.HighlightedText,
+    "refused": QPalette.ColorRole.LinkVisited,
+}
+"""Where the colours of a theme lie in Qt's palette: the sheet names the roles, so that another
+theme is another palette, and no widget's rules need be looked for again."""
+
+_CONSTANT: Final = ("stop", "stop_hover", "latched", "on_stop")
+"""Colours that are the same in every theme."""
+
+
+def stylesheet() -> str:
+    """Return the style sheet of every theme, in the colours of the palette in force."""
     return Template(_SHEET).substitute(
-        asdict(palette),
+        {name: f"palette({_word(role)})" for name, role in ROLES.items()},
+        **{name: getattr(DARK, name) for name in _CONSTANT},
         ink=INK,
         alarm=OKABE_ITO["vermillion"],
+        warning=OKABE_ITO["orange"],
         hover_on_stop="#E3E8ED",
         assets=_ASSETS.as_posix(),
     )
+
+
+def _word(role: QPalette.ColorRole) -> str:
+    """Return how a style sheet spells a role: HighlightedText is "highlighted-text"."""
+    return re.sub("(?<=[a-z])(?=[A-Z])", "-", role.name).lower()

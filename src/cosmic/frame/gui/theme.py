@@ -9,7 +9,8 @@ from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
 from PySide6.QtWidgets import QApplication
 
 from cosmic.frame.gui.palette import DARK, INK, LIGHT, OKABE_ITO, Palette, ThemeName, blend
-from cosmic.frame.gui.stylesheet import stylesheet
+from cosmic.frame.gui.restyle import restyle_shown
+from cosmic.frame.gui.stylesheet import ROLES, stylesheet
 
 STEP_PX: Final = 8
 """All spacing is a multiple of this, or half of it inside a widget."""
@@ -129,38 +130,30 @@ def apply_theme(app: QApplication, name: ThemeName) -> None:
     """
     if name not in _PALETTES:
         raise ValueError(f"there is no theme {name!r}; there are {', '.join(_PALETTES)}")
-    palette = _PALETTES[name]
     app.setProperty(_PROPERTY, name)
     if app.style().name().lower() != "fusion":
         app.setStyle("Fusion")
-    app.setFont(ui_font())
-    app.setPalette(_qt_palette(palette))
-    app.setStyleSheet(stylesheet(palette))
+    if app.font() != ui_font():
+        app.setFont(ui_font())
+    app.setPalette(_qt_palette(_PALETTES[name]))
+    sheet = stylesheet()
+    if app.styleSheet() != sheet:
+        app.setStyleSheet(sheet)
+    else:
+        restyle_shown(app)
 
 
 def _qt_palette(colours: Palette) -> QPalette:
     role = QPalette.ColorRole
-    roles = {
-        role.Window: colours.panel,
+    roles = {each: getattr(colours, name) for name, each in ROLES.items()} | {
         role.WindowText: colours.text,
-        role.Base: colours.field,
         role.AlternateBase: colours.panel,
-        role.Text: colours.text,
-        role.PlaceholderText: colours.dim,
-        role.Button: colours.raised,
         role.ButtonText: colours.text,
         role.BrightText: colours.on_stop,
-        role.Highlight: colours.accent,
-        role.HighlightedText: colours.on_accent,
         role.Accent: colours.accent,
         role.Link: colours.accent,
         role.ToolTipBase: colours.raised,
         role.ToolTipText: colours.text,
-        role.Light: colours.hover,
-        role.Midlight: colours.raised,
-        role.Mid: colours.border,
-        role.Dark: colours.border,
-        role.Shadow: colours.window,
     }
     palette = QPalette()
     for each, colour in roles.items():

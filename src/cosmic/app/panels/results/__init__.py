@@ -1,0 +1,1 @@
+"""The panel Results: sessions, and the viewer of what was recorded."""

@@ -1,0 +1,346 @@
+"""Results: finding what was recorded, and looking at force, positions, images and log together."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from cosmic.app.panels.results.panel import ResultsPanel
+from cosmic.app.results.sessions import read_about
+from cosmic.daqco.core.chunk import DataChunk
+from cosmic.daqco.core.recording_file import RecordingFile
+from cosmic.daqco.core.recording_format import AxisPosition, RecordedEvent, RecordingHeader
+from cosmic.daqco.core.scale import Scale
+from cosmic.daqco.core.settings import ChannelSettings
+from cosmic.frame.failure import FailurePolicy
+from cosmic.vico.core.image import CameraImage, Circumstances
+from cosmic.vico.core.recording.formats import ImageFormat
+from cosmic.vico.core.recording.image_file import ImageFile
+from cosmic.vico.core.recording.side_row import row_of
+from cosmic.vico.hw.interface import Frame
+
+LEFT = Qt.MouseButton.LeftButton
+RATE_HZ = 1000.0
+"""Of the samples; the force rises by `SLOPE` from second to second, and by as much per um."""
+SLOPE = 12.5
+START_S = 100.0
+BEGUN = datetime(2026, 11, 22, 9, 30, tzinfo=UTC)
+
+
+def write_force(
+    path: Path, *, seconds: float = 4.0, slope: float = SLOPE, close: bool = True
+) -> RecordingFile:
+    """Write a recording whose force rises evenly while left.x moves by 1 um/s."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    scale = Scale("as it is", "uN", (0.0, 1.0))
+    channel = ChannelSettings(name="force", board="sim", input="ai0", scale="as it is")
+    header = RecordingHeader(RATE_HZ, (channel,), (scale,), BEGUN, START_S)
+    file = RecordingFile(path, header)
+    add_samples(file, 0.0, seconds, slope)
+    if close:
+        file.close(complete=True)
+    else:
+        file.flush()
+    return file
+
+
+def add_samples(file: RecordingFile, begin_s: float, seconds: float, slope: float = SLOPE) -> None:
+    scale = Scale("as it is", "uN", (0.0, 1.0))
+    first, count = round(begin_s * RATE_HZ), round(seconds * RATE_HZ)
+    after_s = (first + np.arange(count)) / RATE_HZ
+    for time_s in np.arange(begin_s, begin_s + seconds + 0.01, 0.05):
+        file.add_positions([AxisPosition(START_S + time_s, "left.x", 500.0 + time_s)])
+    file.append(
+        DataChunk(
+            first_sample=first,
+            time_s=START_S + begin_s,
+            rate_hz=RATE_HZ,
+            channels=("force",),
+            volts=(slope * after_s)[None, :],
+            scales=(scale,),
+        )
+    )
+    file.add_event(RecordedEvent(START_S + 1.0, first + 1000, "mark", "touched"))
+
+
+def write_images(path: Path, *, count: int = 5, step_s: float = 1.0) -> None:
+    """Write images, one a second, each a little brighter than the one before."""
+    file = ImageFile(path, ImageFormat.PNG)
+    for number in range(count):
+        time_s = START_S + number * step_s
+        data = np.full((64, 96), 40 + 20 * number, np.uint8)
+        image = CameraImage("Microscope", Frame(data, number, time_s, time_s), Circumstances())
+        file.append(data, row_of(image, BEGUN + timedelta(seconds=number * step_s)))
+    file.close(complete=True)
+
+
+@pytest.fixture
+def panel(qtbot: QtBot, tmp_path: Path) -> Iterator[ResultsPanel]:
+    made = ResultsPanel(lambda: (tmp_path,), FailurePolicy(), lambda: None)
+    qtbot.addWidget(made)
+    made.resize(1200, 700)
+    made.show()
+    yield made
+    made.shut_down()
+
+
+def choose(panel: ResultsPanel, qtbot: QtBot, name: str, *, also: bool = False) -> None:
+    """Click a recording in the list, with Ctrl where it is to be compared."""
+    sessions = panel.sessions
+    qtbot.waitUntil(lambda: sessions.row_of(name) is not None)
+    row = sessions.row_of(name)
+    assert row is not None
+    place = sessions.list.visualItemRect(row).center()
+    key = Qt.KeyboardModifier.ControlModifier if also else Qt.KeyboardModifier.NoModifier
+    qtbot.mouseClick(sessions.list.viewport(), LEFT, key, place)
+    qtbot.waitUntil(lambda: any(t.path.stem.startswith(name) for t in panel.viewer.timelines))
+
+
+def test_a_slope_is_read_over_time_and_over_position(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "monday" / "push.h5")
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    viewer = panel.viewer
+    assert f"slope {SLOPE:.3f}" in viewer.slope.text()
+    assert "µN/s" in viewer.slope.text()
+    viewer.across.setCurrentText("left.x")
+    viewer.across.activated.emit(viewer.across.currentIndex())
+    line = viewer.curves.slope()
+    assert line is not None
+    assert line.value == pytest.approx(SLOPE, rel=0.01)
+    assert "µN/µm" in viewer.slope.text()
+
+
+def test_the_cursors_bound_what_is_fitted(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "push.h5")
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    panel.viewer.curves.cursors.setRegion((1.0, 2.0))
+    assert "1.000 s" in panel.viewer.slope.text()
+    assert f"difference {SLOPE:.2f}"[:14] in panel.viewer.slope.text()
+    where, _ = panel.viewer.curves.between()
+    assert (where.min(), where.max()) == (1.0, 2.0)
+
+
+def test_image_force_position_and_log_go_together(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "push.h5")
+    write_images(tmp_path / "film")
+    utc = (BEGUN + timedelta(seconds=2.5)).isoformat()
+    (tmp_path / "log.tsv").write_text(
+        f"time_s\tutc\tlevel\twhere\tmessage\n{START_S + 2.5}\t{utc}\tINFO\tmico\tleft X moves\n"
+    )
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    viewer = panel.viewer
+    viewer.show_moment(3.2)
+    qtbot.waitUntil(lambda: viewer.pictures.image is not None)
+    qtbot.waitUntil(lambda: "image 4 of 5" in viewer.pictures.note.text())
+    assert "40.00 µN" in viewer.moment.text()
+    assert "left.x 503.2" in viewer.moment.text()
+    line = viewer.log.currentItem()
+    assert line is not None
+    assert line.text(1) == "left X moves"
+    first = viewer.log.topLevelItem(0)
+    assert first is not None
+    assert first.text(1) == "touched"
+    qtbot.mouseClick(viewer.log.viewport(), LEFT, pos=viewer.log.visualItemRect(first).center())
+    assert viewer.after_s == pytest.approx(1.0)
+    qtbot.waitUntil(lambda: "image 2 of 5" in viewer.pictures.note.text())
+
+
+def test_a_film_of_another_day_is_not_shown_beside_a_force(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "push.h5")
+    file = ImageFile(tmp_path / "film", ImageFormat.PNG)
+    image = np.zeros((64, 96), np.uint8)
+    frame = Frame(image, 0, START_S + 1.0, START_S + 1.0)
+    row = row_of(CameraImage("Microscope", frame, Circumstances()), BEGUN + timedelta(days=1))
+    file.append(image, row)
+    file.close(complete=True)
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    assert panel.viewer.timelines[0].films == ()
+
+
+def test_the_keyboard_goes_through_a_recording_and_space_plays_it(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "push.h5")
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    viewer = panel.viewer
+    viewer.slider.setFocus()
+    qtbot.keyClick(viewer.slider, Qt.Key.Key_PageUp)
+    assert viewer.after_s == pytest.approx(0.2, abs=0.01)
+    before = viewer.after_s
+    qtbot.keyClick(viewer, Qt.Key.Key_Space)
+    qtbot.waitUntil(lambda: viewer.after_s > before + 0.1)
+    qtbot.keyClick(viewer, Qt.Key.Key_Space)
+    assert not viewer.play.isChecked()
+
+
+def test_recordings_are_compared_each_from_its_start(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "soft.h5", slope=5.0)
+    write_force(tmp_path / "stiff.h5", slope=50.0)
+    panel.refresh()
+    choose(panel, qtbot, "soft")
+    choose(panel, qtbot, "stiff", also=True)
+    qtbot.waitUntil(lambda: len(panel.viewer.curves.lines) == 2)
+    text = panel.viewer.slope.text()
+    assert "soft: slope 5.000" in text
+    assert "stiff: slope 50.000" in text
+    assert "compared with stiff" in panel.viewer.facts.text()
+
+
+def test_a_recording_that_is_written_grows_on_the_screen(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    file = write_force(tmp_path / "now.h5", seconds=1.0, close=False)
+    panel.refresh()
+    choose(panel, qtbot, "now")
+    assert "not closed" in panel.viewer.facts.text()
+    add_samples(file, 1.0, 2.0)
+    file.flush()
+    qtbot.waitUntil(lambda: panel.viewer.timelines[0].end_s - START_S > 2.5)
+    file.close(complete=True)
+    qtbot.waitUntil(lambda: panel.viewer.timelines[0].complete)
+
+
+def test_the_recording_of_a_killed_process_is_shown(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    child = (
+        "import sys, time; from pathlib import Path;"
+        "from gui.app.test_results import write_force;"
+        "f = write_force(Path(sys.argv[1]), close=False); print('written', flush=True);"
+        "time.sleep(60)"
+    )
+    path = tmp_path / "killed.h5"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen(
+        [sys.executable, "-c", child, str(path)], stdout=subprocess.PIPE, env=environment
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().strip() == b"written"
+        process.send_signal(signal.SIGKILL)
+    panel.refresh()
+    choose(panel, qtbot, "killed")
+    assert "not closed" in panel.viewer.facts.text()
+    assert f"slope {SLOPE:.3f}" in panel.viewer.slope.text()
+
+
+def test_what_is_no_recording_says_so(panel: ResultsPanel, qtbot: QtBot, tmp_path: Path) -> None:
+    (tmp_path / "broken.h5").write_bytes(b"no recording")
+    panel.refresh()
+    sessions = panel.sessions
+    qtbot.waitUntil(lambda: sessions.row_of("broken") is not None)
+    row = sessions.row_of("broken")
+    assert row is not None
+    row.setSelected(True)
+    qtbot.waitUntil(lambda: "cannot be shown" in panel.message.text())
+
+
+def test_sample_operator_and_note_are_kept_and_found(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    folder = tmp_path / "monday"
+    write_force(folder / "push.h5")
+    write_force(tmp_path / "tuesday" / "other.h5")
+    (folder / "session.toml").write_text("# kept by hand\nroom = 'B12'\n")
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    sessions = panel.sessions
+    sessions.sample.setFocus()
+    qtbot.keyClicks(sessions.sample, "pine kraft")
+    qtbot.keyClick(sessions.sample, Qt.Key.Key_Return)
+    assert read_about(folder).sample == "pine kraft"
+    kept = (folder / "session.toml").read_text()
+    assert "# kept by hand" in kept
+    assert "B12" in kept
+    sessions.search.setText("kraft")
+    qtbot.waitUntil(lambda: sessions.row_of("other") is None)
+    qtbot.waitUntil(lambda: sessions.row_of("push") is not None)
+
+
+def test_what_is_seen_is_exported(panel: ResultsPanel, qtbot: QtBot, tmp_path: Path) -> None:
+    write_force(tmp_path / "push.h5")
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    panel.viewer.curves.cursors.setRegion((1.0, 1.5))
+    qtbot.mouseClick(panel.viewer.export, LEFT)
+    assert (tmp_path / "push_seen.png").stat().st_size > 1000
+    table = (tmp_path / "push_seen_values.csv").read_text().splitlines()
+    assert table[0] == 'recording,time_s,"force, µN"'
+    assert table[1] == "push,1,12.5"
+    assert len(table) == 502
+    opened: list[Path] = []
+    panel.open_file = opened.append
+    qtbot.mouseClick(panel.message, LEFT)
+    assert opened == [tmp_path / "push_seen.png"]
+    qtbot.mouseClick(panel.viewer.export, LEFT)
+    assert (tmp_path / "push_seen_2.png").exists()
+    panel.refresh()
+    qtbot.wait(100)
+    assert panel.sessions.row_of("push_seen_values") is None  # a table is no film
+
+
+def test_yesterdays_record_is_found_and_its_slope_read_in_six_actions(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "now" / "today.h5", slope=1.0)
+    write_force(tmp_path / "before" / "push.h5")
+    write_force(tmp_path / "long ago" / "push.h5", slope=2.0)
+    now = time.time()
+    for name, days in (("before", 1), ("long ago", 9)):
+        when = now - days * 86_400
+        os.utime(tmp_path / name / "push.h5", (when, when))
+    panel.refresh()
+    actions = 1  # the button of the workspace, counted here
+    sessions = panel.sessions
+    qtbot.waitUntil(lambda: len(sessions.sessions) == 3)
+    sessions.search.setFocus()
+    qtbot.keyClicks(sessions.search, "yesterday")
+    actions += 1
+    assert sessions.row_of("today") is None
+    choose(panel, qtbot, "push")
+    actions += 1
+    assert actions <= 6
+    assert f"slope {SLOPE:.3f}" in panel.viewer.slope.text()
+
+
+def test_thumbnails_show_what_was_recorded(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "push.h5")
+    write_images(tmp_path / "film")
+    panel.refresh()
+    sessions = panel.sessions
+    qtbot.waitUntil(lambda: sessions.row_of("film") is not None)
+
+    def drawn(name: str) -> int:
+        row = sessions.row_of(name)
+        assert row is not None
+        image = row.icon(0).pixmap(56, 32).toImage()
+        places = [(x, y) for x in range(image.width()) for y in range(image.height())]
+        return sum(image.pixelColor(x, y).alpha() > 0 for x, y in places)
+
+    qtbot.waitUntil(lambda: drawn("film") > 100)
+    qtbot.waitUntil(lambda: drawn("push") > 5)
