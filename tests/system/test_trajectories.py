@@ -172,6 +172,34 @@ def test_a_full_disk_is_reported_and_keeps_the_lines_written_before(
     assert len(mico.trajectories.load(path, cut_off=True).statements) > 3
 
 
+class Lossy:
+    """Axes at the end of a line on which messages are lost."""
+
+    def __init__(self, mico: Mico) -> None:
+        self._mico = mico
+        self.clock = mico.clock
+        self.states = mico.states
+        self.follow_recorded = mico.follow_recorded
+        self.missed = 0
+
+
+def test_what_is_lost_on_the_way_is_marked_in_the_recording_which_goes_on(
+    mico: Mico, tmp_path: Path
+) -> None:
+    path, axes = tmp_path / "a.trajectory", Lossy(mico)
+    head = Trajectory("any", (), recorded="today")
+    with TrajectoryRecording(TrajectoryRecorder(axes, path, head, FailurePolicy())) as recording:
+        mico["left.x"].move_to(30.0)
+        axes.missed = 2
+        mico["left.x"].move_to(10.0)
+    said = path.read_text(encoding="utf-8")
+    assert recording.missed == 2
+    assert recording.error is None
+    assert said.count("2 messages from the station were lost before here") == 1
+    assert "left.x to 10 um" in said
+    assert mico.trajectories.load(path).statements
+
+
 def test_a_recording_goes_on_over_a_rescan_and_ends_with_the_platform(tmp_path: Path) -> None:
     path = tmp_path / "a.trajectory"
     with platform(rate=20.0) as (mico, _library, _scene):

@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from cosmic.autonomy.campaign.campaign import Campaign, Treatment
-from cosmic.autonomy.campaign.recipe import Recipe, load_recipe
+from cosmic.autonomy.campaign.recipe import Recipe, asks_the_same, load_recipe
 from cosmic.autonomy.campaign.records import TWIN, CampaignError, CampaignInfo
 from cosmic.autonomy.campaign.resume import ResumePlan, resume
 from cosmic.autonomy.campaign.storage_format import DATABASE
@@ -148,7 +148,7 @@ def _store(
 
 
 def _check_same(info: CampaignInfo, recipe: Recipe, folder: Path, host: CampaignHost) -> None:
-    if info.recipe_text != recipe.text:
+    if not asks_the_same(info.recipe_text, recipe, PARAMETERS):
         raise CampaignError(
             f"{folder} holds a campaign by another recipe than {recipe.path}: resume with "
             "that recipe, or name another folder"

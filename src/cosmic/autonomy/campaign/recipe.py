@@ -1,5 +1,6 @@
 """Recipes: what a campaign does, in one TOML file."""
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any, Final
 from pydantic import Field, field_validator
 
 from cosmic.autonomy.campaign.stop_rule import StopSettings
-from cosmic.frame.config import StrictModel, check_model, load_model, shipped_config_dir
+from cosmic.frame.config import StrictModel, check_model, read_toml, shipped_config_dir
 from cosmic.frame.errors import ConfigError
 
 RECIPES: Final = "recipes"
@@ -113,7 +114,40 @@ def load_recipe(path: Path, *, procedures: Mapping[str, type[StrictModel]] | Non
         One line per fault, each with file, key and reason.
     """
     path = _found(path)
-    file = load_model(path, RecipeFile)
+    return _checked(path, read_toml(path), path.read_text(encoding="utf-8"), procedures)
+
+
+def asks_the_same(
+    text: str, recipe: Recipe, procedures: Mapping[str, type[StrictModel]] | None = None
+) -> bool:
+    """Return whether the text of an earlier recipe asks for the same as `recipe`.
+
+    Comments, the order of keys, values that are written out although they are the usual ones, the
+    description and names that procedures had before make no difference.
+    """
+    if text == recipe.text:
+        return True
+    try:
+        earlier = _checked(recipe.path, tomllib.loads(text), text, procedures)
+    except (ConfigError, ValueError):
+        return False
+    return _asked(earlier) == _asked(recipe)
+
+
+def _asked(recipe: Recipe) -> tuple[RecipeFile, StrictModel | None]:
+    """Return what of a recipe changes a campaign."""
+    parameters = recipe.file.parameters if recipe.parameters is None else {}
+    said = {"description": "", "parameters": parameters}
+    return recipe.file.model_copy(update=said), recipe.parameters
+
+
+def _checked(
+    path: Path,
+    data: object,
+    text: str,
+    procedures: Mapping[str, type[StrictModel]] | None,
+) -> Recipe:
+    file = check_model(path, data, RecipeFile)
     parameters = None
     if procedures is not None:
         if file.procedure not in procedures:
@@ -124,7 +158,6 @@ def load_recipe(path: Path, *, procedures: Mapping[str, type[StrictModel]] | Non
         parameters = check_model(
             path, file.parameters, procedures[file.procedure], under="parameters"
         )
-    text = path.read_text(encoding="utf-8")
     return Recipe(name=path.stem, path=path, text=text, file=file, parameters=parameters)
 
 

@@ -119,6 +119,10 @@ class Mico(Declared):
 
     @override
     def take_lease_of(self, lease: StationLease) -> None:
+        if not isinstance(lease, StationLease):
+            raise TypeError(f"lease must be that of a station, not {str(lease)[:60]}")
+        if self.remote:
+            raise NotAvailable("the lease of a station is decided at the station")
         self._manager.lease.join(lease)
 
     # Where the axes are at another station

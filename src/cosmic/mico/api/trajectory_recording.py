@@ -47,6 +47,11 @@ class TrajectoryRecording:
         """Why it ended early, such as a full disk; None when it did not."""
         return self._recorder.error
 
+    @property
+    def missed(self) -> int:
+        """How much from a station was lost on its way; a remark in the file marks where."""
+        return self._recorder.missed
+
     def subscribe(self, callback: Callable[[], object]) -> Callable[[], None]:
         """Call `callback()` after each line and at a failure; returns what ends it.
 

@@ -1,5 +1,6 @@
 """`TrajectoryRecorder`: writes all movements into a trajectory as they happen (thesis 6.1.3)."""
 
+import logging
 import os
 from abc import abstractmethod
 from collections.abc import Callable, Collection, Mapping
@@ -23,6 +24,8 @@ from cosmic.mico.core.trajectory.reader import END_OF_RECORDING
 from cosmic.mico.core.trajectory.segments import SegmentBuilder
 from cosmic.mico.core.trajectory.words import number
 from cosmic.mico.core.trajectory.writer import head_lines, statement_lines
+
+logger = logging.getLogger(__name__)
 
 IDLE_S: Final = 0.1
 OpenFile = Callable[[Path, str], BinaryIO]
@@ -72,6 +75,11 @@ class Recordable(Protocol):
     def clock(self) -> Clock:
         """By which movements are dated."""
 
+    @property
+    @abstractmethod
+    def missed(self) -> int:
+        """How much of what a station sent did not arrive."""
+
     @abstractmethod
     def states(self) -> Mapping[str, PositionerState]:
         """Return the state of every axis by name."""
@@ -106,6 +114,9 @@ class TrajectoryRecorder(WorkerThread):
         What positions count from, by axis; those of a named pose.
     sources : collection of str or None
         Whose movements: "window", "key", "script" ...; None: everybody's.
+
+    Where something from a station was lost on its way, a remark says so in the file and the
+    recording goes on; `missed` counts it.
 
     Signals
     -------
@@ -149,6 +160,7 @@ class TrajectoryRecorder(WorkerThread):
         self._lines = 0
         self._size = 0
         self._under_way: set[str] = set()
+        self._missed_before, self._missed = axes.missed, 0
         self._builder = SegmentBuilder(
             self._take,
             lambda text: self._write([f"# {text}"]),
@@ -185,6 +197,11 @@ class TrajectoryRecorder(WorkerThread):
     def error(self) -> RecordingError | None:
         """Why the recording ended early; None when it did not."""
         return self._error
+
+    @property
+    def missed(self) -> int:
+        """How much from a station was lost on its way while this was recorded."""
+        return self._missed
 
     @property
     def recording(self) -> bool:
@@ -227,6 +244,7 @@ class TrajectoryRecorder(WorkerThread):
     def run_body(self) -> None:
         try:
             self._record()
+            self._note_missed()
             states = self._axes.states()
             now_s = self._axes.clock.now_s()
             self._builder.close(positions_of(states), now_s, resting_of(states))
@@ -241,6 +259,7 @@ class TrajectoryRecorder(WorkerThread):
             except Empty:
                 self._builder.idle(self._axes.clock.now_s())
                 continue
+            self._note_missed()
             match item:
                 case None:
                     return
@@ -254,6 +273,15 @@ class TrajectoryRecorder(WorkerThread):
                     )
                 case RecordedEnd():
                     self._builder.ended(item.name, item.positions, item.time_s, well=item.well)
+
+    def _note_missed(self) -> None:
+        """Mark in the file where something is missing."""
+        missed = self._axes.missed - self._missed_before
+        if missed > self._missed:
+            lost, self._missed = missed - self._missed, missed
+            text = f"{lost} messages from the station were lost before here: movements are missing"
+            logger.error("%s: %s", self.path, text)
+            self._write([f"# {text}"])
 
     def _take(self, found: Statement | tuple[str, Place]) -> None:
         if isinstance(found, tuple):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from cosmic.autonomy.bending.plan import SpanLimits
-from cosmic.autonomy.campaign.recipe import load_recipe, shipped_recipes
+from cosmic.autonomy.campaign.recipe import asks_the_same, load_recipe, shipped_recipes
 from cosmic.autonomy.handling.settings import StandardSettings
 from cosmic.autonomy.shipped.registry import PARAMETERS
 from cosmic.frame.config import StrictModel
@@ -78,6 +78,31 @@ def test_a_procedure_under_the_name_that_it_had_before_is_found(tmp_path: Path) 
     recipe = load_recipe(path, procedures=PARAMETERS)
     assert recipe.file.procedure == "bend test with two grippers"
     assert recipe.file.procedure in PARAMETERS
+
+
+OLD = """
+procedure = "bend test with two hands"
+[stop]
+count = 3  # three will do
+[twin]
+seed = 0
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "same"),
+    [
+        (OLD, True),
+        ('procedure = "bend test with two grippers"\n[stop]\ncount = 3\n', True),
+        (OLD.replace("[stop]", 'description = "again"\n[stop]'), True),
+        (OLD.replace("count = 3", "count = 4"), False),
+        (OLD.replace("seed = 0", "seed = 1"), False),
+        ("procedure = ", False),
+    ],
+)
+def test_recipes_are_compared_by_what_they_ask_for(text: str, same: bool, tmp_path: Path) -> None:
+    recipe = load_recipe(written(tmp_path, OLD), procedures=PARAMETERS)
+    assert asks_the_same(text, recipe, PARAMETERS) is same
 
 
 def test_a_recipe_that_is_not_there_says_which_ones_ship() -> None:
