@@ -202,6 +202,7 @@ def fibre(
         widths_px=np.full(120, width),
         length_px=length,
         length_std_px=0.1,
+        length_interval_px=(0.0, 1e9),
         projected_length_px=length,
         width_px=width,
         width_std_px=0.1,
@@ -216,6 +217,8 @@ def fibre(
         contrast=60.0,
         lighter=False,
         certain=not doubts,
+        probability=0.5 if doubts else 1.0,
+        signs=(),
         doubts=doubts,
         uncertainties=MappingProxyType({}),
     )

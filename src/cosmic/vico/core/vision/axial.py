@@ -6,6 +6,8 @@ a patch that is twice as dark, or a step. What counts as a sign is judged agains
 unevenness, so that a rough fibre is not taken to pieces.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import binary_erosion, gaussian_filter1d, median_filter, uniform_filter1d
@@ -22,53 +24,88 @@ STEP = "its width, contrast or course changes in one step: it may be two fibres 
 # Standard deviations of the fibre's own unevenness.
 TIMES = 6.5
 # Shares of the fibre's contrast, or of its width, below which nothing is a sign.
-DIP, BUMP = 0.1, 0.3
+DIP, NOTCH, CORNER, BUMP = 0.1, 0.12, 0.15, 0.3
 CONTRAST_STEP, WIDTH_STEP = 0.12, 0.1
 SIDE_STEP, SIDE_STEP_PX = 0.04, 0.4
 # Narrower, a lumen, a speck on it and an overlap look alike: a gap alone is a sign then.
-LEAST_WIDTH_PX = 7.5
+LEAST_WIDTH_PX = 4.0
 
 
-def joints(scene: Scene, course: Course) -> list[str]:
+@dataclass(frozen=True, slots=True)
+class Joints:
+    """Signs along a fibre, each as a multiple of where it begins to count.
+
+    Attributes
+    ----------
+    gap, waist, notch : float
+        The ground shines through the middle, over the whole width, or at one side,
+        where a corner may stand out as well.
+    doubled : float
+        A stretch takes more light away.
+    darkness, width, aside : float
+        Steps of contrast, of width and of the centre line.
+    """
+
+    gap: float = 0.0
+    waist: float = 0.0
+    notch: float = 0.0
+    doubled: float = 0.0
+    darkness: float = 0.0
+    width: float = 0.0
+    aside: float = 0.0
+
+    @property
+    def doubts(self) -> list[str]:
+        """Reasons that count."""
+        found = [GAP] if max(self.gap, self.waist, self.notch) > 1.0 else []
+        if self.doubled > 1.0:
+            found.append(DOUBLED)
+        if max(self.darkness, self.width, self.aside) > 1.0:
+            found.append(STEP)
+        return found
+
+
+def joints(scene: Scene, course: Course) -> Joints:
     """Return the signs along a course that one fibre ends on it and another begins."""
     line = resampled(course.line, 1.0)
     blur = max(1.0, min(course.blur_px, 0.4 * course.width))
-    seen = _seen(course, line, blur)
+    seen = _seen(course, course.good, line, blur)
+    # Where the ground shines through, no edges are seen.
+    free = _seen(course, course.free, line, blur)
     if seen.sum() < 6.0 * course.width:
-        return []
+        return Joints()
     height, across = _heights(scene, course, line, blur)
     inner = height[:, np.abs(across) <= 0.3 * course.width].mean(axis=1).astype(np.float64)
     typical = middle(inner[seen])
     if not typical > 0:
-        return []
+        return Joints()
     inner /= typical
     mass = height.sum(axis=1).astype(np.float64)
     mass /= max(middle(mass[seen]), 1e-6)
     parts = (np.abs(height) * across).sum(axis=1) / np.maximum(np.abs(height).sum(axis=1), 1e-6)
     side = parts.astype(np.float64) / course.width
-    found = []
     window = 2 * int(3.0 * course.width) + 1
     fine = [_uneven(values, blur, window) for values in (inner, mass)]
-    if any(_beyond(-values, seen, DIP) for values in fine):
-        found.append(GAP)
+    gap, waist = (_beyond(-values, seen, free, DIP) for values in fine)
     if course.width < LEAST_WIDTH_PX:
-        return found
-    if _beyond(fine[0], seen, BUMP):
-        found.append(DOUBLED)
+        return Joints(gap, waist)
+    notch = _notch(height, across, (seen, free), course.width, blur)
     steps = (
         (inner, CONTRAST_STEP),
         (mass, WIDTH_STEP),
         (side, max(SIDE_STEP, SIDE_STEP_PX / course.width)),
     )
-    if any(_stepped(values, seen, course.width, blur, least) for values, least in steps):
-        found.append(STEP)
-    return found
+    darkness, width, aside = (
+        _stepped(values, seen, course.width, blur, least) for values, least in steps
+    )
+    doubled = _beyond(fine[0], seen, seen, BUMP)
+    return Joints(gap, waist, notch, doubled, darkness, width, aside)
 
 
-def _seen(course: Course, line: Floats, blur: float) -> Flags:
-    """Return the points with nothing else near, away from the ends."""
+def _seen(course: Course, flags: Flags, line: Floats, blur: float) -> Flags:
+    """Return the points with a flag all around, away from the ends."""
     s, at = arc_lengths(course.line), arc_lengths(line)
-    good = np.interp(at, s, course.good.astype(float)) > 0.99
+    good = np.interp(at, s, flags.astype(float)) > 0.99
     good = binary_erosion(good, iterations=max(1, int(0.5 * course.width)))
     skip = int(np.ceil(0.75 * course.width + 3.0 * blur))
     good[:skip] = good[-skip:] = False
@@ -97,24 +134,39 @@ def _uneven(values: Floats, blur: float, window: int) -> Floats:
     return np.asarray(fine - median_filter(fine, window, mode="nearest"))
 
 
-def _beyond(values: Floats, seen: Flags, least: float) -> bool:
-    """Return whether something stands out from a fibre's own unevenness."""
+def _notch(
+    height: Floats32, across: Floats32, where: tuple[Flags, Flags], width: float, blur: float
+) -> float:
+    """Return how far a notch in one side, or a corner, stands out from its own unevenness."""
+    found = [0.0]
+    window = 2 * int(3.0 * width) + 1
+    for side in (-1.0, 1.0):
+        outer = height[:, side * across >= 0.15 * width].sum(axis=1).astype(np.float64)
+        outer /= max(middle(outer[where[0]]), 1e-6)
+        fine = _uneven(outer, blur, window)
+        found.append(_beyond(-fine, *where, NOTCH))
+        found.append(_beyond(fine, where[0], where[0], CORNER))
+    return max(found)
+
+
+def _beyond(values: Floats, seen: Flags, where: Flags, least: float) -> float:
+    """Return how far something stands out somewhere from a fibre's own unevenness as it is seen."""
     spread = 1.4826 * middle(np.abs(values[seen]))
-    return bool((values[seen] > max(least, TIMES * spread)).any())
+    return float(values[where | seen].max()) / max(least, TIMES * spread)
 
 
-def _stepped(values: Floats, seen: Flags, width: float, blur: float, least: float) -> bool:
-    """Return whether the mean of a stretch differs from that of the next one."""
+def _stepped(values: Floats, seen: Flags, width: float, blur: float, least: float) -> float:
+    """Return how far the mean of a stretch differs from that of the next one."""
     size = max(6, int(1.5 * width))
     apart = int(np.ceil(0.5 * size + 1.5 * blur))
     if len(values) < 4 * size + 4 * apart:
-        return False
+        return 0.0
     mean = uniform_filter1d(values, size, mode="nearest")
     step = mean[2 * apart :] - mean[: -2 * apart]
     whole = binary_erosion(seen, iterations=apart + size // 2)[apart:-apart]
     if whole.sum() < size:
-        return False
+        return 0.0
     # What a slope gives at both sides of a step belongs to no step.
     step = step - median_filter(step, 4 * size + 1, mode="nearest")
     spread = 1.4826 * middle(np.abs(step[whole]))
-    return bool((np.abs(step[whole]) > max(least, TIMES * spread)).any())
+    return float(np.abs(step[whole]).max()) / max(least, TIMES * spread)

@@ -1,5 +1,6 @@
 """Reasons not to rely on what was found."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ LEFT_OVER = "something beside it belongs to no fibre"
 CROWDED = "the image is full of fibres: no single one can be told apart"
 IMPRECISE = "its length is known to less than one per cent"
 PARTED = "it may be two fibres side by side: the ground shows between its edges"
+RUNS_ON = (EndKind.BODY, EndKind.LOST)
 EDGING = "it lies along the edge of something wider"
 DIRTY_END = "at an end its edges are not seen: dirt may lie there"
 SHARP = "it bends more sharply than its own width"
@@ -37,6 +39,7 @@ class Limits:
     turn: float = 1.6
     tilt: float = 0.4
     contrast_to_noise: float = 1.5
+    levels: float = 4.0
     fade: float = 0.55
     width_spread: float = 0.3
     seen: float = 0.6
@@ -46,8 +49,8 @@ class Limits:
 LIMITS = Limits()
 
 
-def doubts_of(course: Course) -> list[str]:
-    """Return what is doubtful about one fibre by itself."""
+def doubts_of(course: Course, step: float) -> list[str]:
+    """Return what is doubtful about one fibre by itself; `step` is one of 256 levels."""
     found = [
         end.kind.value for end in course.ends if end.kind not in (EndKind.FREE, EndKind.HIDDEN)
     ]
@@ -59,7 +62,7 @@ def doubts_of(course: Course) -> list[str]:
         (course.blur_px > min(blurred_px, LIMITS.blur_most_px), OUT_OF_FOCUS),
         (parted(course), PARTED),
         (edging(course, typical) > LIMITS.edging, EDGING),
-        (typical < LIMITS.contrast_to_noise * course.noise, FAINT),
+        (typical < max(LIMITS.contrast_to_noise * course.noise, LIMITS.levels * step), FAINT),
         (fades(course, typical), FADES),
         (dirty_end(course), DIRTY_END),
         (width_spread(course) > LIMITS.width_spread, UNEVEN),
@@ -146,25 +149,33 @@ def sharpest_turn(course: Course) -> float:
     return float(np.abs(turn).max()) if len(turn) else 0.0
 
 
-def continued(lines: list[Floats], widths: list[float]) -> set[int]:
-    """Return the fibres at an end of which another one, or their own other end, goes on."""
+def continued(courses: Sequence[Course]) -> set[int]:
+    """Return the fibres at an end of which another one, or their own other end, goes on.
+
+    Ends so near that they may touch are one broken fibre at any angle, as far as is known; so is
+    one that begins at the end of another with an end that cannot be told from that.
+    """
     found: set[int] = set()
     ends = [
-        (index, line[at], outward(line, at)) for index, line in enumerate(lines) for at in (0, -1)
+        (index, each.line[at], outward(each.line, at), end.kind in RUNS_ON)
+        for index, each in enumerate(courses)
+        for at, end in zip((0, -1), each.ends, strict=True)
     ]
     if not ends:
         return found
-    points = np.array([point for _, point, _ in ends])
+    widths = [each.width for each in courses]
+    points = np.array([point for _, point, _, _ in ends])
     for first, last in cKDTree(points).query_pairs(4.0 * max(widths) + 30.0):
-        i, point, out = ends[first]
-        j, other, other_out = ends[last]
+        (i, point, out, runs), (j, other, other_out, other_runs) = ends[first], ends[last]
         step = other - point
         gap = float(np.linalg.norm(step))
-        if gap > 2.0 * (widths[i] + widths[j]) + 30.0:
-            continue
-        step /= max(gap, 1e-9)
-        if float(out @ step) > 0.8 and float(other_out @ -step) > 0.8:
+        both = widths[i] + widths[j]
+        if i != j and gap < (both + 12.0 if runs or other_runs else 0.9 * both + 6.0):
             found |= {i, j}
+        elif gap <= 2.0 * both + 30.0:
+            step /= max(gap, 1e-9)
+            if float(out @ step) > 0.8 and float(other_out @ -step) > 0.8:
+                found |= {i, j}
     return found
 
 

@@ -32,11 +32,14 @@ class End:
     ----------
     along_px : float
         Where it is beyond the line's last point (negative: before it).
+    soft_px : float
+        Over which length it falls from four fifths of its height to one fifth.
     """
 
     kind: EndKind
     along_px: float
     std_px: float
+    soft_px: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +114,17 @@ def crossing(along: Floats, mean: Floats, inside: Flags, height: float, level: L
         slope = max(float(scaled[index] - scaled[index + 1]) / (along[1] - along[0]), 1e-3)
         noise = level.noise / max(height, 1e-6) / np.sqrt(max(1.0, level.width)) / slope
         point = float(along[index] + share * (along[1] - along[0]))
-        return End(EndKind.FREE, point, float(np.hypot(0.15, 0.7 * noise)))
+        soft = softness(along, scaled, int(index), limit)
+        return End(EndKind.FREE, point, float(np.hypot(0.15, 0.7 * noise)), soft)
     if limit < len(along):
         return End(EndKind.BORDER, float(along[max(0, limit - 1)]), 0.5)
     return End(EndKind.BODY, 0.0, level.width)
+
+
+def softness(along: Floats, scaled: Floats, index: int, limit: int) -> float:
+    """Return over which length a profile falls from 0.8 to 0.2 around `index`."""
+    before = np.nonzero(scaled[: index + 1] >= 0.8)[0]
+    after = np.nonzero(scaled[index + 1 : limit] <= 0.2)[0]
+    start = int(before[-1]) if len(before) else 0
+    stop = index + 1 + int(after[0]) if len(after) else limit - 1
+    return float(along[stop] - along[start])

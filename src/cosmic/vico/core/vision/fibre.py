@@ -21,6 +21,8 @@ class Fibre:
         Width at each of them.
     length_px, length_std_px : float
         Along the centre line; the part that can be seen.
+    length_interval_px : (float, float)
+        Holds the length of a certain fibre in 95 of 100 cases.
     projected_length_px : float
         The largest distance between two of its points.
     width_px : float
@@ -47,6 +49,12 @@ class Fibre:
         Whether it is lighter than the ground.
     certain : bool
         Whether all this can be relied on; if not, `doubts` says why.
+    probability : float
+        That it is one whole fibre, on images like those it was calibrated on; a certain one has
+        0.999 and more.
+    signs : tuple of float
+        How clear each sign is that it is not one, or not whole, in the order of
+        `certainty.NAMES`; by itself each counts from 1 on.
     uncertainties : mapping of str to float or str
         Standard deviation of each value by its name, or the reason why there is none.
     """
@@ -55,6 +63,7 @@ class Fibre:
     widths_px: Floats
     length_px: float
     length_std_px: float
+    length_interval_px: tuple[float, float]
     projected_length_px: float
     width_px: float
     width_std_px: float
@@ -69,6 +78,8 @@ class Fibre:
     contrast: float
     lighter: bool
     certain: bool
+    probability: float
+    signs: tuple[float, ...]
     doubts: tuple[str, ...]
     uncertainties: Mapping[str, float | str]
 

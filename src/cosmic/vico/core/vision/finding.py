@@ -8,7 +8,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from cosmic.frame.errors import NotAvailable
-from cosmic.vico.core.vision import axial, checks
+from cosmic.vico.core.vision import certainty, checks
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
@@ -22,7 +22,7 @@ from cosmic.vico.core.vision.measures import (
 )
 from cosmic.vico.core.vision.profiles import Scene
 from cosmic.vico.core.vision.refine import Course, Neighbours, near_ends, refine
-from cosmic.vico.core.vision.relief import find_relief
+from cosmic.vico.core.vision.relief import find_relief, level_step
 from cosmic.vico.core.vision.section import (
     APERTURE_PX,
     FEWEST_ROWS,
@@ -89,6 +89,7 @@ def _found(pixels: Pixels) -> list[Fibre]:
         relief.mask.astype(np.float32),
         relief.factor,
         1.0 if relief.lighter else -1.0,
+        1.0 if pixels.dtype == np.uint8 else level_step(pixels),
     )
     least = max(LEAST_PX, LEAST_OF_IMAGE * float(np.hypot(*pixels.shape)))
     kept = [each for each in strands(graph) if long_enough(each, relief.factor, least)]
@@ -149,7 +150,9 @@ def section_of(scene: Scene, course: Course) -> Section:
     return Section(course.width, 0.2 * course.width + 0.2, blur_ln, 0.5, 0.0)
 
 
-def fibre(scene: Scene, course: Course, section: Section, doubts: list[str]) -> Fibre:
+def fibre(
+    scene: Scene, course: Course, section: Section, doubts: list[str], signs: certainty.Signs
+) -> Fibre:
     """Return what a course amounts to."""
     fine = resampled(course.line, 0.5, multiple=4)
     line = fine[::4]
@@ -163,6 +166,9 @@ def fibre(scene: Scene, course: Course, section: Section, doubts: list[str]) -> 
     length_std = length_deviation(course, length)
     if length_std > 0.01 * length:
         doubts.append(checks.IMPRECISE)
+    whole = certainty.probability(signs, doubts)
+    if not (doubts or whole >= certainty.CERTAIN):
+        doubts.append(certainty.IMPROBABLE)
     width_std = width_deviation(course, section)
     free = clear_around(scene, line, width)
     contrast = float(np.median(course.contrast[course.good]))
@@ -171,6 +177,7 @@ def fibre(scene: Scene, course: Course, section: Section, doubts: list[str]) -> 
         widths_px=frozen(widths),
         length_px=length,
         length_std_px=length_std,
+        length_interval_px=certainty.interval(length, length_std),
         projected_length_px=projected,
         width_px=width,
         width_std_px=width_std,
@@ -185,6 +192,8 @@ def fibre(scene: Scene, course: Course, section: Section, doubts: list[str]) -> 
         contrast=contrast,
         lighter=scene.sign > 0,
         certain=not doubts,
+        probability=whole,
+        signs=signs.values,
         doubts=tuple(dict.fromkeys(doubts)),
         uncertainties=MappingProxyType(
             uncertainties(length, length_std, width, width_std, projected, ends_std)
@@ -267,12 +276,14 @@ def checked_fibres(
     """Return the fibres, the longest first, with what is doubtful about them together."""
     lines = [course.line for _, course in courses]
     widths = [course.width for _, course in courses]
-    apart = checks.continued(lines, widths)
-    beside = left_over(scene, lines, widths)
+    apart = checks.continued([course for _, course in courses])
+    explained = explained_by(scene, lines, widths)
+    beside = left_over(scene, lines, widths, explained)
     sections = pooled([section_of(scene, course) for _, course in courses])
     found = []
     for index, (strand, course) in enumerate(courses):
-        doubts = [*strand.doubts, *checks.doubts_of(course), *axial.joints(scene, course)]
+        signs = certainty.signs_of(scene, course, explained)
+        doubts = [*strand.doubts, *checks.doubts_of(course, scene.step), *signs.doubts]
         if touches_border(scene, course):
             doubts.append(EndKind.BORDER.value)
         if crowd:
@@ -281,7 +292,7 @@ def checked_fibres(
             doubts.append(checks.CONTINUES)
         if index in beside:
             doubts.append(checks.LEFT_OVER)
-        found.append(fibre(scene, course, sections[index], doubts))
+        found.append(fibre(scene, course, sections[index], doubts, signs))
     return sorted(found, key=lambda each: -each.length_px)
 
 
@@ -298,11 +309,16 @@ def strip(mask: Mask, line: Floats, width: float) -> None:
     paint(mask, np.concatenate([part, line[-1:]]), np.full(len(part) + 1, width))
 
 
-def left_over(scene: Scene, lines: list[Floats], widths: list[float]) -> set[int]:
-    """Return the fibres to which something large clings that no fibre explains."""
+def explained_by(scene: Scene, lines: list[Floats], widths: list[float]) -> Mask:
+    """Return where fibres lie on the reduced image, with some room."""
     explained = np.zeros(scene.taken.shape, np.uint8)
     for line, width in zip(lines, widths, strict=True):
         strip(explained, scene.reduced(line), width / scene.factor + 4.0)
+    return explained
+
+
+def left_over(scene: Scene, lines: list[Floats], widths: list[float], explained: Mask) -> set[int]:
+    """Return the fibres to which something large clings that no fibre explains."""
     rest = ((scene.taken > 0) & (explained == 0)).astype(np.uint8)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
     areas = stats[:, cv2.CC_STAT_AREA].copy()

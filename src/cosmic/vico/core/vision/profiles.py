@@ -84,12 +84,15 @@ class Scene:
         1 where something stands out, reduced by `factor`.
     sign : float
         1 for fibres lighter than the ground, -1 for darker ones.
+    step : float
+        One of 256 levels of the range that the image uses.
     """
 
     image: Floats32
     taken: Floats32
     factor: int
     sign: float
+    step: float = 1.0
 
     @property
     def corner(self) -> Floats:

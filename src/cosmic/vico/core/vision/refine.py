@@ -34,6 +34,8 @@ class Course:
         Full-size pixels, evenly spaced.
     good : ndarray of bool, shape (n,)
         Where both edges were seen.
+    free : ndarray of bool, shape (n,)
+        Where nothing else known covers the cross section.
     widths : ndarray, shape (n,)
         NaN where they were not.
     """
@@ -51,6 +53,7 @@ class Course:
     mean: Floats = field(default_factory=lambda: np.zeros(0))
     ground: Floats = field(default_factory=lambda: np.zeros(0))
     tilt: Floats = field(default_factory=lambda: np.zeros(0))
+    free: Flags = field(default_factory=lambda: np.zeros(0, bool))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,6 +171,7 @@ def measure(scene: Scene, course: Course, neighbours: Neighbours) -> bool:
     if good.sum() < 4:
         return False
     take(course, edges, widths, good, profiles)
+    course.free = free
     inner = good & ~near_ends(course)
     weights = np.where(inner if inner.sum() >= 4 else good, 1.0, 0.0)
     offset = np.where(good, 0.5 * (edges.left + edges.right), 0.0)

@@ -1,0 +1,119 @@
+"""What goes on beyond an end: a fibre that thins or fades there is not whole.
+
+Rays leave an end in all directions. Where something narrow and fainter than the fibre goes on, the
+rays along it differ from those beside them, near the end and further away alike; in the direction
+the fibre comes from they are left out, and so is what belongs to other fibres.
+"""
+
+from typing import Final
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from cosmic.vico.core.vision.ends import EndKind
+from cosmic.vico.core.vision.grey import Floats, Mask, middle
+from cosmic.vico.core.vision.profiles import Flags, Scene, sample
+from cosmic.vico.core.vision.refine import Course
+
+GOES_ON = "something thinner or fainter goes on beyond an end: it may be a part of a fibre"
+SOFT = "an end is less sharp than the image, so that the fibre may go on"
+
+RAYS: Final = 144
+AHEAD_DEG: Final = 80.0
+BACK_DEG: Final = 125.0
+FEWEST_RAYS: Final = 30
+AROUND: Final = 45
+"""Rays among which one must stand out."""
+# Standard deviations among the rays, and a share of the fibre's contrast, from which it counts.
+TIMES: Final = 5.0
+SHARE: Final = 0.07
+# How far an end is blurred: by the image, by a slanting or round cut.
+SOFT_BLURS: Final = 3.0
+SOFT_WIDTHS: Final = 0.6
+
+
+def goes_on(scene: Scene, course: Course, explained: Mask) -> float:
+    """Return how clearly something goes on beyond an end; from 1 on it counts.
+
+    Parameters
+    ----------
+    explained : ndarray, shape of the reduced image, uint8
+        Where fibres lie, this one and the others.
+    """
+    found = [0.0]
+    for at, end in zip((0, -1), course.ends, strict=True):
+        if end.kind is EndKind.FREE:
+            found.append(_rays(scene, course, at, explained))
+    return max(found)
+
+
+def soft(course: Course) -> float:
+    """Return how much less sharp an end is than image and cut make it; from 1 on it counts."""
+    blur = max(1.0, min(course.blur_px, 0.4 * course.width))
+    usual = SOFT_BLURS * blur + SOFT_WIDTHS * course.width
+    return max([0.0, *(end.soft_px / usual for end in course.ends if end.kind is EndKind.FREE)])
+
+
+def _rays(scene: Scene, course: Course, at: int, explained: Mask) -> float:
+    line = course.line if at else course.line[::-1]
+    count = int(np.clip(round(0.6 * course.width), 3, max(3, len(line) // 3)))
+    out = line[-1] - line[-1 - min(count, len(line) - 1)]
+    blur = max(1.0, min(course.blur_px, 0.4 * course.width))
+    first = 0.5 * course.width + 2.0 * blur + 2.0
+    size = max(8.0, 1.2 * course.width)
+    radii = first + np.arange(0.0, 2.0 * size)
+    turns = np.linspace(-np.pi, np.pi, RAYS, endpoint=False)
+    angles = np.arctan2(out[1], out[0]) + turns
+    x = (line[-1, 0] + radii[:, None] * np.cos(angles)).astype(np.float32)
+    y = (line[-1, 1] + radii[:, None] * np.sin(angles)).astype(np.float32)
+    right, bottom = scene.corner
+    free = (x >= 0) & (x <= right) & (y >= 0) & (y <= bottom)
+    free &= (
+        sample(explained.astype(np.float32), scene.reduced_by_axis(x), scene.reduced_by_axis(y))
+        < 0.1
+    )
+    values = scene.sign * sample(scene.image, x, y)
+    half = len(radii) // 2
+    near, far = (_means(values[part], free[part]) for part in (slice(half), slice(half, None)))
+    known = np.isfinite(near) & np.isfinite(far) & (np.abs(turns) < np.radians(BACK_DEG))
+    if known.sum() < FEWEST_RAYS:
+        return 0.0
+    ahead = known & (np.abs(turns) < np.radians(AHEAD_DEG))
+    if not ahead.any():
+        return 0.0
+    near, far = _above(near, known), _above(far, known)
+    both = np.minimum(near, _widest(far))
+    spread = max(_spread(near[known]), _spread(far[known]))
+    contrast = middle(course.contrast[course.good]) if course.good.any() else 1.0
+    return float(both[ahead].max()) / max(TIMES * spread, SHARE * contrast)
+
+
+def _means(values: Floats, free: Flags) -> Floats:
+    """Return the mean of each ray as far as it is free; NaN where less than half is."""
+    count = free.sum(axis=0)
+    total = np.where(free, values, 0.0).sum(axis=0)
+    mean = np.where(2 * count > len(values), total / np.maximum(count, 1), np.nan)
+    # Neighbouring rays show the same pixels near the end.
+    padded = np.concatenate([mean[-1:], mean, mean[:1]])
+    return np.asarray((padded[:-2] + padded[1:-1] + padded[2:]) / 3.0)
+
+
+def _above(mean: Floats, known: Flags) -> Floats:
+    """Return how far rays lie above those around them, light that falls off taken away."""
+    filled = np.where(known, mean, middle(mean[known]))
+    order = np.flatnonzero(known)
+    filled = np.interp(np.arange(RAYS), order, filled[order])
+    return np.asarray(np.where(known, filled - median_filter(filled, AROUND), -np.inf))
+
+
+def _widest(values: Floats) -> Floats:
+    """Return the largest of each ray and its neighbours: what goes on may bend."""
+    reach = RAYS // 30
+    return np.asarray(
+        np.max([np.roll(values, shift) for shift in range(-reach, reach + 1)], axis=0)
+    )
+
+
+def _spread(values: Floats) -> float:
+    """Return a robust standard deviation."""
+    return 1.4826 * middle(np.abs(values - middle(values)))

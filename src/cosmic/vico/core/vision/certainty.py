@@ -1,0 +1,98 @@
+"""How probable it is that what was found is one whole fibre, and how long it is.
+
+The signs along a fibre and at its ends are weighed together: each lowers the probability, the more
+the clearer it is. The weights are those of `benchmarks/certainty.py`, which draws single fibres and
+pairs, finds them, and fits a logistic curve to what came out. Half of what it draws is no single
+fibre; the probability told is for a sample in which one of a hundred is not.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import exp, log
+from typing import Final
+
+from cosmic.vico.core.vision import axial, beyond
+from cosmic.vico.core.vision.axial import Joints
+from cosmic.vico.core.vision.ends import EndKind
+from cosmic.vico.core.vision.grey import Mask
+from cosmic.vico.core.vision.joining import ON_ANOTHER
+from cosmic.vico.core.vision.profiles import Scene
+from cosmic.vico.core.vision.refine import Course
+
+CERTAIN: Final = 0.999
+IMPROBABLE: Final = "weak signs together make it less than certain that it is one whole fibre"
+
+NAMES: Final = (
+    "gap", "waist", "notch", "doubled", "darkness", "width", "aside", "goes on", "soft",
+)  # fmt: skip
+WEIGHTS: Final = (1.0, 1.0, 8.3, 4.5, 4.2, 7.6, 10.7, 3.9, 1.7)
+"""Fitted; those of gap and waist, of which a clear one is a doubt by itself, are floors."""
+FITTED_LOGIT: Final = 4.7
+"""Logit of the probability where there is no sign, on images of which a half is no single fibre."""
+FITTED_ODDS: Final = 1.44
+PRIOR_ODDS: Final = 99.0
+"""Whole fibres for each that is two or a part, among what is found: a guess."""
+ALONE: Final = FITTED_LOGIT + log(PRIOR_ODDS / FITTED_ODDS)
+DOUBT: Final = 6.0
+"""What each other reason to doubt takes off: a guess."""
+STEEPNESS: Final = 4
+"""A sign half as clear as one that counts by itself weighs so many powers of two less."""
+
+MOST: Final = 1.5
+INTERVAL_STDS: Final = 2.2
+"""Within so many standard deviations lie 95 of 100 lengths of drawn single fibres."""
+CUT_OFF: Final = frozenset(
+    {EndKind.BORDER.value, EndKind.BODY.value, EndKind.LOST.value, ON_ANOTHER}
+)
+"""What has one of these is not seen whole."""
+
+
+@dataclass(frozen=True, slots=True)
+class Signs:
+    """Signs that a fibre is not one, or not whole; each counts by itself from 1 on."""
+
+    joints: Joints = field(default_factory=Joints)
+    goes_on: float = 0.0
+    soft: float = 0.0
+
+    @property
+    def doubts(self) -> list[str]:
+        """Reasons that count by themselves."""
+        found = self.joints.doubts
+        if self.goes_on > 1.0:
+            found.append(beyond.GOES_ON)
+        if self.soft > 1.0:
+            found.append(beyond.SOFT)
+        return found
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Each sign in the order of `NAMES`, from nothing to `MOST`."""
+        j = self.joints
+        along = (j.gap, j.waist, j.notch, j.doubled, j.darkness, j.width, j.aside)
+        return tuple(min(max(each, 0.0), MOST) for each in (*along, self.goes_on, self.soft))
+
+
+def signs_of(scene: Scene, course: Course, explained: Mask) -> Signs:
+    """Return the signs of a course; `explained` says where fibres lie on the reduced image."""
+    return Signs(
+        axial.joints(scene, course),
+        beyond.goes_on(scene, course, explained),
+        beyond.soft(course),
+    )
+
+
+def probability(signs: Signs, doubts: Sequence[str]) -> float:
+    """Return how probable it is that something is one whole fibre."""
+    if not CUT_OFF.isdisjoint(doubts):
+        return 0.0
+    others = len(set(doubts) - set(signs.doubts))
+    taken = sum(
+        weight * value**STEEPNESS for weight, value in zip(WEIGHTS, signs.values, strict=True)
+    )
+    return 1.0 / (1.0 + exp(taken + DOUBT * others - ALONE))
+
+
+def interval(length: float, std: float) -> tuple[float, float]:
+    """Return what holds the length in 95 of 100 cases."""
+    return max(0.0, length - INTERVAL_STDS * std), length + INTERVAL_STDS * std
