@@ -27,6 +27,7 @@ LONG = frozenset(
         "campaign",
         "campaign_faults",
         "campaign_kills",
+        "certainty",
         "collision_oracles",
         "full_soak",
         "soak",

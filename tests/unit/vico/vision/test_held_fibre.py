@@ -59,7 +59,7 @@ def test_the_slope_at_the_clamp_is_that_of_the_fibre() -> None:
     assert shape.clamps[0].angle_deg == pytest.approx(np.degrees(angle), abs=0.6)
 
 
-def test_a_fibre_elsewhere_is_not_taken_for_the_held_one() -> None:
+def test_a_fibre_far_off_is_not_taken_for_the_held_one() -> None:
     image = jaws_and(arc((300.0, 60.0), 0.0, 260.0, 0.0))
     with pytest.raises(NotAvailable, match="between the jaws"):
         held_shape(find_fibres(image)[0], gripper_on(image))

@@ -6,6 +6,7 @@ a patch that is twice as dark, or a step. What counts as a sign is judged agains
 unevenness, so that a rough fibre is not taken to pieces.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,8 +28,11 @@ TIMES = 6.5
 DIP, NOTCH, CORNER, BUMP = 0.1, 0.12, 0.15, 0.3
 CONTRAST_STEP, WIDTH_STEP = 0.12, 0.1
 SIDE_STEP, SIDE_STEP_PX = 0.04, 0.4
-# Narrower, a lumen, a speck on it and an overlap look alike: a gap alone is a sign then.
-LEAST_WIDTH_PX = 4.0
+# Narrower, a gap alone is a sign; below THIN_PX a lumen, a speck on it and an overlap look alike, so
+# that the rest counts less.
+LEAST_WIDTH_PX, THIN_PX, THIN = 4.0, 7.5, 0.75
+# The largest of so many standard deviations is what a fibre of 150 points has by chance.
+MANY = 3.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +103,9 @@ def joints(scene: Scene, course: Course) -> Joints:
         _stepped(values, seen, course.width, blur, least) for values, least in steps
     )
     doubled = _beyond(fine[0], seen, seen, BUMP)
-    return Joints(gap, waist, notch, doubled, darkness, width, aside)
+    part = THIN if course.width < THIN_PX else 1.0
+    rest = (part * each for each in (notch, doubled, darkness, width, aside))
+    return Joints(gap, waist, *rest)
 
 
 def _seen(course: Course, flags: Flags, line: Floats, blur: float) -> Flags:
@@ -151,8 +157,15 @@ def _notch(
 
 def _beyond(values: Floats, seen: Flags, where: Flags, least: float) -> float:
     """Return how far something stands out somewhere from a fibre's own unevenness as it is seen."""
-    spread = 1.4826 * middle(np.abs(values[seen]))
-    return float(values[where | seen].max()) / max(least, TIMES * spread)
+    limit = _limit(values[seen], least)
+    return float(values[where | seen].max()) / limit
+
+
+def _limit(values: Floats, least: float) -> float:
+    """Return from where on a value counts: the largest of many grows with their number."""
+    spread = 1.4826 * middle(np.abs(values))
+    many = math.sqrt(2.0 * math.log(max(len(values), 2))) / MANY
+    return max(least, TIMES * max(1.0, many) * spread)
 
 
 def _stepped(values: Floats, seen: Flags, width: float, blur: float, least: float) -> float:
@@ -168,5 +181,4 @@ def _stepped(values: Floats, seen: Flags, width: float, blur: float, least: floa
         return 0.0
     # What a slope gives at both sides of a step belongs to no step.
     step = step - median_filter(step, 4 * size + 1, mode="nearest")
-    spread = 1.4826 * middle(np.abs(step[whole]))
-    return float(np.abs(step[whole]).max()) / max(least, TIMES * spread)
+    return float(np.abs(step[whole]).max()) / _limit(step[whole], least)
