@@ -133,6 +133,9 @@ def _add_file_commands(
     measure.add_argument(
         "--output", type=Path, metavar="FOLDER", help="results (default: ./measured)"
     )
+    measure.add_argument(
+        "--every", type=int, default=1, metavar="N", help="of a video each N-th image only"
+    )
     measure.add_argument("--overwrite", action="store_true", help="replace results that exist")
     device = commands.add_parser(
         "new-device", help="write a package that brings a device or a method, to change it"

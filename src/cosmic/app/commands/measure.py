@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,11 +14,14 @@ from cosmic.vico.api.measure import (
     read_images,
     write_csv,
     write_json,
+    write_napari,
+    write_networks,
     write_overlay,
     write_rois,
 )
 
-TABLE, WHOLE = "fibres.csv", "fibres.json"
+TABLE, WHOLE, NETWORKS, REPORT = "fibres.csv", "fibres.json", "networks.csv", "report.md"
+BARS = 10
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -26,20 +30,22 @@ def run(chosen: argparse.Namespace) -> int:
     folder: Path = chosen.output or Path("measured")
     _prepare(folder, overwrite=chosen.overwrite)
     measured: list[Measurement] = []
-    refused = 0
+    refused: list[str] = []
     for number, file in enumerate(files, start=1):
         if sys.stderr.isatty():
             sys.stderr.write(f"\r{number} of {len(files)}: {file.name}\033[K")
         try:
-            measured += _measured(file, folder, f"{number:04d}-{file.stem}", chosen.pixel_size_um)
+            measured += _measured(file, folder, f"{number:04d}-{file.stem}", chosen)
         except CosmicError as exc:
-            refused += 1
+            refused.append(f"{file.name}: {exc}")
             sys.stderr.write(f"\ncosmic: {file}: {exc}\n")
     if sys.stderr.isatty():
         sys.stderr.write("\n")
     write_csv(folder / TABLE, measured)
     write_json(folder / WHOLE, measured)
-    sys.stdout.write(summary(measured, refused) + f"{folder}\n")
+    write_networks(folder / NETWORKS, measured)
+    write_report(folder / REPORT, measured, refused)
+    sys.stdout.write(summary(measured, len(refused)) + f"{folder}\n")
     return 1 if refused else 0
 
 
@@ -69,21 +75,64 @@ def summary(measured: Sequence[Measurement], refused: int) -> str:
         mean = sum(lengths) / len(lengths)
         weighted = sum(length**2 for length in lengths) / sum(lengths)
         lines.append(f"length of certain fibres: mean {mean:.1f} µm, weighted {weighted:.1f} µm")
+    networks = sum(each.network is not None for each in measured)
+    if networks:
+        lines.append(f"networks without a certain fibre: {networks}")
     without = sum(each.pixel_size_um is None for each in measured)
     if without:
         lines.append(f"images without a pixel size: {without}; give one with --pixel-size-um")
     return "".join(f"{line}\n" for line in lines)
 
 
-def _measured(
-    file: Path, folder: Path, stem: str, pixel_size_um: float | None
-) -> list[Measurement]:
+def write_report(path: Path, measured: Sequence[Measurement], refused: Sequence[str]) -> None:
+    """Write what was found as a page: counts, lengths, reasons to doubt, files refused.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be written.
+    """
+    lines = [
+        "# Fibres measured",
+        "",
+        *(f"- {each}" for each in summary(measured, len(refused)).split("\n") if each),
+    ]
+    lines += _lengths([length for each in measured for length in each.lengths_um])
+    doubts = Counter(doubt for each in measured for fibre in each.fibres for doubt in fibre.doubts)
+    if doubts:
+        lines += ["", "## Why fibres are not certain", "", "| fibres | reason |", "|---:|---|"]
+        lines += [f"| {count} | {doubt} |" for doubt, count in doubts.most_common()]
+    if refused:
+        lines += ["", "## Files refused", "", *(f"- {each}" for each in refused)]
+    try:
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as exc:
+        raise RecordingError(f"{path}: cannot be written ({exc.strerror or exc})") from exc
+
+
+def _lengths(lengths_um: Sequence[float]) -> list[str]:
+    """Return a table of how many certain fibres have which length."""
+    if not lengths_um:
+        return []
+    low, high = min(lengths_um), max(lengths_um)
+    step = (high - low) / BARS or 1.0
+    counts = Counter(min(BARS - 1, int((each - low) / step)) for each in lengths_um)
+    rows = [
+        f"| {low + step * bar:.0f} to {low + step * (bar + 1):.0f} | {counts[bar]} |"
+        for bar in range(BARS)
+        if counts[bar]
+    ]
+    return ["", "## Lengths of certain fibres", "", "| µm | fibres |", "|---|---:|", *rows]
+
+
+def _measured(file: Path, folder: Path, stem: str, chosen: argparse.Namespace) -> list[Measurement]:
     found = []
-    for number, page in enumerate(read_images(file), start=1):
-        one = measure_page(page, pixel_size_um)
+    for number, page in enumerate(read_images(file, chosen.every), start=1):
+        one = measure_page(page, chosen.pixel_size_um)
         name = stem if number == 1 else f"{stem}-page-{number}"
         write_overlay(folder / f"{name}-overlay.png", page.pixels, one)
         write_rois(folder / f"{name}-rois.zip", one)
+        write_napari(folder / f"{name}-napari.csv", one)
         found.append(one)
     return found
 

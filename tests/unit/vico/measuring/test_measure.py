@@ -106,3 +106,68 @@ def test_what_cannot_be_read_is_named_and_the_rest_is_measured(
     assert (out / "0002-good-overlay.png").exists()
     with pytest.raises(RecordingError, match="is not one of"):
         cosmic.measure(tmp_path / "film.xyz")
+
+
+def web(seed: int = 2) -> np.ndarray:
+    """Return an image so full of fibres that no single one can be made out."""
+    rng = np.random.default_rng(seed)
+    image = np.full((400, 500), 40.0, np.float32)
+    for _ in range(28):
+        x, y = rng.uniform(0, 500), rng.uniform(0, 400)
+        angle = rng.normal(0.5, 0.3)
+        step = 700.0 * np.array([np.cos(angle), np.sin(angle)])
+        ends = [(int(x - step[0]), int(y - step[1])), (int(x + step[0]), int(y + step[1]))]
+        cv2.line(image, *ends, 170.0, 5, cv2.LINE_AA)
+    image = cv2.GaussianBlur(image, (0, 0), 1.0) + rng.normal(0.0, 3.0, image.shape)
+    return np.clip(image, 0, 255).astype(np.uint8)
+
+
+def test_a_network_is_measured_where_no_fibre_can_be(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "web.png"), web())
+    out = tmp_path / "out"
+    assert main(["measure", str(tmp_path / "web.png"), "--output", str(out)]) == 0
+    (row,) = csv.DictReader((out / "networks.csv").read_text(encoding="utf-8").splitlines())
+    assert int(row["junctions"]) > 60
+    assert float(row["direction_deg"]) == pytest.approx(np.degrees(0.5), abs=8.0)
+    assert 0.4 < float(row["alignment"]) < 0.95
+    (image,) = json.loads((out / "fibres.json").read_text(encoding="utf-8"))["images"]
+    assert sum(image["network"]["orientation_share"]) == pytest.approx(1.0, abs=0.01)
+
+
+def test_images_of_a_video_are_measured(tmp_path: Path) -> None:
+    file = tmp_path / "film.avi"
+    size = (IMAGE.shape[1], IMAGE.shape[0])
+    writer = cv2.VideoWriter(str(file), cv2.VideoWriter_fourcc(*"MJPG"), 10.0, size)
+    for _ in range(5):
+        writer.write(cv2.merge([IMAGE] * 3))
+    writer.release()
+    out = tmp_path / "out"
+    assert main(["measure", str(file), "--every", "2", "--output", str(out)]) == 0
+    rows = list(csv.DictReader((out / "fibres.csv").read_text(encoding="utf-8").splitlines()))
+    assert [row["image"] for row in rows] == [f"film.avi image {n}" for n in (1, 3, 5)]
+    assert "## Lengths" not in (out / "report.md").read_text(encoding="utf-8")
+
+
+def test_the_report_says_why_fibres_are_doubted_and_files_refused(tmp_path: Path) -> None:
+    folder, out = tmp_path / "images", tmp_path / "out"
+    folder.mkdir()
+    cut = drawn_image([arc((-40.0, 100.0), 0.2, 300.0, 0.6)], [9.0], shape=(300, 400))
+    cv2.imwrite(str(folder / "cut.png"), cut)
+    cv2.imwrite(str(folder / "whole.png"), IMAGE)
+    (folder / "broken.png").write_bytes(b"no image")
+    assert main(["measure", str(folder), "--pixel-size-um", "2", "--output", str(out)]) == 1
+    report = (out / "report.md").read_text(encoding="utf-8")
+    assert "the image's border cuts it off" in report
+    assert "broken.png" in report
+    assert "## Lengths of certain fibres" in report
+
+
+def test_napari_gets_a_path_for_each_fibre(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), IMAGE)
+    out = tmp_path / "out"
+    assert main(["measure", str(tmp_path / "a.png"), "--output", str(out)]) == 0
+    rows = list(csv.DictReader((out / "0001-a-napari.csv").read_text().splitlines()))
+    line = cosmic.measure(IMAGE).fibres[0].centre_line_px
+    assert {row["shape-type"] for row in rows} == {"path"}
+    assert float(rows[0]["axis-0"]) == pytest.approx(line[0, 1], abs=0.01)
+    assert float(rows[0]["axis-1"]) == pytest.approx(line[0, 0], abs=0.01)

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     import tifffile
 
 TIFF = (".tif", ".tiff")
-SUFFIXES = (*TIFF, ".png", ".jpg", ".jpeg")
+VIDEO = (".avi", ".mkv", ".mov", ".mp4")
+SUFFIXES = (*TIFF, ".png", ".jpg", ".jpeg", *VIDEO)
 # What a resolution says above is how large a picture is printed (300 dpi are 85 µm).
 PRINTED_UM = 25.0
 UM_IN = {"m": 1e6, "cm": 1e4, "mm": 1e3, "µm": 1.0, "μm": 1.0, "um": 1.0, "nm": 1e-3}
@@ -42,8 +43,8 @@ class FileImage:
     pixel_size_from: str
 
 
-def read_images(path: Path) -> Iterator[FileImage]:
-    """Yield the pages of a TIFF, PNG or JPEG.
+def read_images(path: Path, every: int = 1) -> Iterator[FileImage]:
+    """Yield the pages of a TIFF, PNG or JPEG, or each `every`-th image of a video.
 
     Raises
     ------
@@ -52,6 +53,9 @@ def read_images(path: Path) -> Iterator[FileImage]:
     """
     if path.suffix.lower() not in SUFFIXES:
         raise RecordingError(f"{path}: is not one of {', '.join(SUFFIXES)}")
+    if path.suffix.lower() in VIDEO:
+        yield from _video_images(path, every)
+        return
     if path.suffix.lower() in TIFF:
         yield from _tiff_pages(path)
         return
@@ -83,6 +87,27 @@ def _tiff_pages(path: Path) -> Iterator[FileImage]:
                 yield FileImage(name, pixels, size, source)
     except (OSError, ValueError, LookupError, struct.error, tifffile.TiffFileError) as exc:
         raise RecordingError(f"{path}: cannot be read ({exc})") from exc
+
+
+def _video_images(path: Path, every: int) -> Iterator[FileImage]:
+    """Yield images of a video one after another; it says nothing of its pixel size."""
+    video = cv2.VideoCapture(str(path))
+    number = 0
+    try:
+        while video.grab():
+            number += 1
+            if (number - 1) % max(1, every):
+                continue
+            done, pixels = video.retrieve()
+            if not done:
+                break
+            yield FileImage(f"{path.name} image {number}", pixels, None, NOT_KNOWN)
+    except cv2.error as exc:
+        raise RecordingError(f"{path}: cannot be read ({exc})") from exc
+    finally:
+        video.release()
+    if not number:
+        raise RecordingError(f"{path}: is no video that can be read, or damaged")
 
 
 def _tiff_size_um(file: "tifffile.TiffFile") -> tuple[float | None, str]:

@@ -18,6 +18,7 @@ from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.grey import grey_image
 
 CERTAIN_BGR, DOUBTFUL_BGR = (80, 200, 60), (40, 140, 255)
+NETWORK_BGR, BUNDLE_BGR = (220, 180, 40), (200, 60, 200)
 ROI_VERSION, POLYLINE, SUB_PIXEL = 228, 5, 128
 
 
@@ -29,6 +30,32 @@ def write_csv(path: Path, measured: Sequence[Measurement]) -> None:
         writer = csv.DictWriter(text, list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
+    _write(path, text.getvalue().encode())
+
+
+def write_networks(path: Path, measured: Sequence[Measurement]) -> None:
+    """Write a row for each network, if there is one; raises `RecordingError`."""
+    rows = [row for each in measured if (row := each.network_row()) is not None]
+    if not rows:
+        return
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, list(rows[0]))
+    writer.writeheader()
+    writer.writerows(rows)
+    _write(path, text.getvalue().encode())
+
+
+def write_napari(path: Path, measured: Measurement) -> None:
+    """Write the centre lines as a layer of shapes that napari opens; raises `RecordingError`.
+
+    napari counts rows first, from the centre of a pixel as this program does.
+    """
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(["index", "shape-type", "vertex-index", "axis-0", "axis-1"])
+    for number, fibre in enumerate(measured.fibres):
+        for vertex, (x, y) in enumerate(fibre.centre_line_px.tolist()):
+            writer.writerow([number, "path", vertex, round(y, 3), round(x, 3)])
     _write(path, text.getvalue().encode())
 
 
@@ -45,10 +72,33 @@ def write_json(path: Path, measured: Sequence[Measurement]) -> None:
                 row | {"centre_line_px": np.round(fibre.centre_line_px, 3).tolist()}
                 for row, fibre in zip(each.rows(), each.fibres, strict=True)
             ],
+            "network": _whole_network(each),
         }
         for each in measured
     ]
     _write(path, json.dumps({"images": images}, indent=1, ensure_ascii=False).encode())
+
+
+def _whole_network(measured: Measurement) -> dict[str, object] | None:
+    row, net = measured.network_row(), measured.network
+    if row is None or net is None:
+        return None
+    return {
+        **row,
+        "orientation_share": np.round(net.orientation_share, 5).tolist(),
+        "junctions_px": np.round(net.junctions_px, 2).tolist(),
+        "segment_list": [
+            {
+                "junctions": each.junctions,
+                "length_px": each.length_px,
+                "width_px": each.width_px,
+                "orientation_deg": each.orientation_deg,
+                "bundle": each.bundle,
+                "line_px": np.round(each.line_px, 2).tolist(),
+            }
+            for each in net.segments
+        ],
+    }
 
 
 def write_overlay(path: Path, image: npt.NDArray[np.generic], measured: Measurement) -> None:
@@ -63,6 +113,10 @@ def write_overlay(path: Path, image: npt.NDArray[np.generic], measured: Measurem
         cv2.polylines(drawn, [line], False, colour, 2, cv2.LINE_AA, shift=4)
         x, y = (int(value) for value in fibre.centre_line_px[0])
         cv2.putText(drawn, str(number), (x + 6, y - 6), cv2.FONT_HERSHEY_SIMPLEX, 0.6, colour, 2)
+    for segment in measured.network.segments if measured.network is not None else ():
+        line = np.round(segment.line_px * 16).astype(np.int32).reshape(-1, 1, 2)
+        colour = BUNDLE_BGR if segment.bundle else NETWORK_BGR
+        cv2.polylines(drawn, [line], False, colour, 1, cv2.LINE_AA, shift=4)
     done, coded = cv2.imencode(".png", drawn)
     if not done:
         raise RecordingError(f"{path}: the overlay cannot be written as PNG")

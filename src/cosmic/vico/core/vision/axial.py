@@ -25,11 +25,11 @@ STEP = "its width, contrast or course changes in one step: it may be two fibres 
 # Standard deviations of the fibre's own unevenness.
 TIMES = 6.5
 # Shares of the fibre's contrast, or of its width, below which nothing is a sign.
-DIP, NOTCH, CORNER, BUMP = 0.1, 0.12, 0.15, 0.3
+DIP, NOTCH, BUMP = 0.1, 0.12, 0.3
 CONTRAST_STEP, WIDTH_STEP = 0.12, 0.1
 SIDE_STEP, SIDE_STEP_PX = 0.04, 0.4
-# Narrower, a gap alone is a sign; below THIN_PX a lumen, a speck on it and an overlap look alike, so
-# that the rest counts less.
+# Narrower, a gap alone is a sign; below THIN_PX a lumen, a speck on it and an overlap look alike,
+# so that the rest counts less.
 LEAST_WIDTH_PX, THIN_PX, THIN = 4.0, 7.5, 0.75
 # The largest of so many standard deviations is what a fibre of 150 points has by chance.
 MANY = 3.2
@@ -42,8 +42,7 @@ class Joints:
     Attributes
     ----------
     gap, waist, notch : float
-        The ground shines through the middle, over the whole width, or at one side,
-        where a corner may stand out as well.
+        The ground shines through the middle, over the whole width, or at one side.
     doubled : float
         A stretch takes more light away.
     darkness, width, aside : float
@@ -143,7 +142,7 @@ def _uneven(values: Floats, blur: float, window: int) -> Floats:
 def _notch(
     height: Floats32, across: Floats32, where: tuple[Flags, Flags], width: float, blur: float
 ) -> float:
-    """Return how far a notch in one side, or a corner, stands out from its own unevenness."""
+    """Return how far a notch in one side stands out from its own unevenness."""
     found = [0.0]
     window = 2 * int(3.0 * width) + 1
     for side in (-1.0, 1.0):
@@ -151,7 +150,6 @@ def _notch(
         outer /= max(middle(outer[where[0]]), 1e-6)
         fine = _uneven(outer, blur, window)
         found.append(_beyond(-fine, *where, NOTCH))
-        found.append(_beyond(fine, where[0], where[0], CORNER))
     return max(found)
 
 

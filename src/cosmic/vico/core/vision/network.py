@@ -14,13 +14,18 @@ import numpy.typing as npt
 
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.vision.graph import FREE, Graph, build_graph, prune
-from cosmic.vico.core.vision.grey import Floats, Mask, grey_image
-from cosmic.vico.core.vision.relief import Relief, find_relief, kernel
+from cosmic.vico.core.vision.grey import Floats, Floats32, Mask, grey_image, middle
+from cosmic.vico.core.vision.relief import Pieces, reduced
 from cosmic.vico.core.vision.smoothing import arc_lengths
 
 MOST_FORKS: Final = 20_000
 LEVELS: Final = (0.8, 1.0, 1.25)
 BINS: Final = 18
+SMALL_PX: Final = 900
+SCALES_PX: Final = (1.2, 2.0, 3.2)
+NOISE_TIMES: Final = 2.5
+OF_STRONGEST: Final = 0.15
+LEAST_AREA: Final = 12
 LEAST_SEGMENT: Final = 3.0
 LARGEST_SPREAD: Final = 0.1
 MOST_COVERED: Final = 0.6
@@ -106,24 +111,47 @@ def find_network(image: npt.NDArray[np.generic]) -> Network:
     """
     pixels = grey_image(image)
     try:
-        relief = find_relief(pixels)
-        graphs = [_graph(_mask(relief, level)) for level in LEVELS]
+        factor = max(1, round(max(pixels.shape) / SMALL_PX))
+        ridges = _ridges(reduced(pixels, factor))
+        masks = [_mask(ridges, level) for level in LEVELS]
+        graphs = [_graph(mask) for mask in masks]
     except (ValueError, ArithmeticError, IndexError, cv2.error) as exc:
         raise NotAvailable(f"a network cannot be looked for on this image ({exc})") from exc
-    lengths = [_length(graph) * relief.factor for graph in graphs]
-    return _network(graphs[1], relief, lengths)
+    lengths = [_length(graph) * factor for graph in graphs]
+    return _network(graphs[1], factor, float(masks[1].mean()), lengths)
 
 
-def _mask(relief: Relief, level: float) -> Mask:
-    """Return what stands out locally, at a multiple of the threshold that is used for fibres."""
-    taken = relief.height[relief.mask > 0]
-    if not taken.size:
-        return relief.mask
-    size = max(9, int(0.06 * max(relief.height.shape))) | 1
-    around = cv2.blur(relief.height, (size, size))
-    limit = np.maximum(level * around, 0.5 * level * float(np.percentile(taken, 10)))
-    mask = (relief.height > limit).astype(np.uint8)
-    return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, kernel(3)), dtype=np.uint8)
+def _ridges(small: Floats32) -> Floats32:
+    """Return how much each point lies on a ridge, lighter or darker, whichever is narrower.
+
+    Of two neighbouring grounds the fibres are what is narrow: their ridges are sharper.
+    """
+    sides = []
+    for sign in (1.0, -1.0):
+        best = np.zeros_like(small)
+        for scale in SCALES_PX:
+            smooth = cv2.GaussianBlur(np.float32(sign) * small, (0, 0), scale)
+            xx, yy, xy = (
+                cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((2, 0), (0, 2), (1, 1))
+            )
+            half, apart = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+            # Across a ridge it falls off, along it nothing happens.
+            ridge = np.float32(scale**2) * (apart - half - np.abs(half + apart))
+            best = np.maximum(best, ridge)
+        sides.append(best)
+    strong = [float(np.mean(np.sort(side.ravel())[-side.size // 20 :])) for side in sides]
+    return np.asarray(sides[int(np.argmax(strong))], dtype=np.float32)
+
+
+def _mask(ridges: Floats32, level: float) -> Mask:
+    """Return where a ridge stands out, at a multiple of the usual threshold."""
+    usual = max(NOISE_TIMES * middle(ridges), OF_STRONGEST * float(np.percentile(ridges, 99.0)))
+    mask = (ridges > level * usual).astype(np.uint8)
+    pieces = Pieces.of(mask)
+    keep = np.repeat(pieces.areas >= LEAST_AREA, pieces.areas)
+    found = np.zeros(mask.size, np.uint8)
+    found[pieces.order[keep]] = 1
+    return found.reshape(mask.shape)
 
 
 def _graph(mask: Mask) -> Graph:
@@ -140,8 +168,7 @@ def _length(graph: Graph) -> float:
     return sum(each.length for each in graph.branches if each.length >= LEAST_SEGMENT)
 
 
-def _network(graph: Graph, relief: Relief, lengths: Sequence[float]) -> Network:
-    factor = relief.factor
+def _network(graph: Graph, factor: int, covered: float, lengths: Sequence[float]) -> Network:
     kept = [each for each in graph.branches if each.length >= LEAST_SEGMENT]
     halves = np.array([graph.half_width(each.points) for each in kept])
     typical = float(np.median(halves)) if len(halves) else 0.0
@@ -161,7 +188,6 @@ def _network(graph: Graph, relief: Relief, lengths: Sequence[float]) -> Network:
             )
         )
     share, alignment, direction = _directions(segments)
-    covered = float(_mask(relief, 1.0).mean())
     spread = float(np.ptp(lengths)) / 2.0
     doubts = [
         reason
