@@ -125,18 +125,7 @@ def _add_file_commands(
     setup.add_argument("--config", type=Path, default=None, metavar="PATH", help=_CONFIG)
     setup.add_argument("--move", action="store_true", help="offer to move each a little")
     setup.add_argument("--write", action="store_true", help="add the entries; comments are kept")
-    measure = commands.add_parser("measure", help="measure the fibres on images of any origin")
-    measure.add_argument("images", type=Path, nargs="+", metavar="IMAGE", help="files or folders")
-    measure.add_argument(
-        "--pixel-size-um", type=float, metavar="UM", help="instead of what the files say"
-    )
-    measure.add_argument(
-        "--output", type=Path, metavar="FOLDER", help="results (default: ./measured)"
-    )
-    measure.add_argument(
-        "--every", type=int, default=1, metavar="N", help="of a video each N-th image only"
-    )
-    measure.add_argument("--overwrite", action="store_true", help="replace results that exist")
+    _add_measure(commands)
     device = commands.add_parser(
         "new-device", help="write a package that brings a device or a method, to change it"
     )
@@ -156,6 +145,21 @@ def _add_file_commands(
     repair = commands.add_parser("repair", help="close recordings that a killed process left open")
     repair.add_argument("recordings", type=Path, nargs="+", metavar="FILE")
     repair.add_argument("--ended", action="store_true", help="no program writes them any more")
+
+
+def _add_measure(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    measure = commands.add_parser("measure", help="measure the fibres on images of any origin")
+    measure.add_argument("images", type=Path, nargs="+", metavar="IMAGE", help="files or folders")
+    measure.add_argument(
+        "--pixel-size-um", type=float, metavar="UM", help="instead of what the files say"
+    )
+    measure.add_argument(
+        "--output", type=Path, metavar="FOLDER", help="results (default: ./measured)"
+    )
+    measure.add_argument(
+        "--every", type=int, default=1, metavar="N", help="of a video each N-th image only"
+    )
+    measure.add_argument("--overwrite", action="store_true", help="replace results that exist")
 
 
 def _add_simulate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
