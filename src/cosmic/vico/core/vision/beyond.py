@@ -72,7 +72,7 @@ def _rays(scene: Scene, course: Course, at: int, explained: Mask) -> float:
         sample(explained.astype(np.float32), scene.reduced_by_axis(x), scene.reduced_by_axis(y))
         < 0.1
     )
-    values = scene.sign * sample(scene.image, x, y)
+    values = (scene.sign * sample(scene.image, x, y)).astype(np.float64)
     half = len(radii) // 2
     near, far = (_means(values[part], free[part]) for part in (slice(half), slice(half, None)))
     known = np.isfinite(near) & np.isfinite(far) & (np.abs(turns) < np.radians(BACK_DEG))
