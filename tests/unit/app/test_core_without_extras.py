@@ -45,6 +45,12 @@ for module in pkgutil.walk_packages(cosmic.__path__, "cosmic."):
             print(module.name, exc.name)
 """
 NEEDS_NET = ("cosmic.frame.network.",)
+GATEWAYS = {
+    "cosmic.app.gateways.http": {"starlette", "uvicorn"},
+    "cosmic.app.gateways.epics": {"caproto"},
+    "cosmic.app.gateways.epics_channels": {"caproto"},
+    "cosmic.app.gateways.epics_motor": {"caproto"},
+}
 NEEDS_PYTEST = ("cosmic.testing.",)
 
 
@@ -60,6 +66,8 @@ def test_only_the_network_needs_an_extra() -> None:
     missed = dict(line.split() for line in ended.stdout.splitlines())
     suites = {name for name in missed if name.startswith(NEEDS_PYTEST)}
     assert {missed.pop(name) for name in suites} == {"pytest"}, "suites need pytest, nothing else"
+    for name, extras in GATEWAYS.items():
+        assert missed.pop(name, "") in {*extras, ""}
     assert not {name: lacking for name, lacking in missed.items() if not name.startswith(NEEDS_NET)}
     lacking = set(missed.values())
     assert lacking <= {"msgpack", "zenoh", "cryptography"}

@@ -209,7 +209,7 @@ class HttpGateway:
             except HttpError as exc:
                 return _refusal(exc.status, "HttpError", str(exc))
             except CosmicError as exc:
-                return _told(exc)
+                return _answer_of(exc)
             except ClientDisconnect:
                 return Response(status_code=400)
             except Exception as exc:  # noqa: BLE001 - a defect: told, and the others go on
@@ -297,7 +297,7 @@ class HttpGateway:
             return JSONResponse(shown, 202)
         failure = operation.failure
         if failure is not None:
-            return _told(failure)
+            return _answer_of(failure)
         result = to_json(operation.result)
         return JSONResponse({"operation": number, "done": True, "result": result})
 
@@ -656,7 +656,7 @@ def _seconds(request: Request, name: str, default: float) -> float:
 _STATUS: Final = ((MoveRefused, 409), (Busy, 503), (CallRefused, 400), (RemoteDefect, 500))
 
 
-def _told(error: Exception) -> Response:
+def _answer_of(error: Exception) -> Response:
     status = next((code for kind, code in _STATUS if isinstance(error, kind)), 422)
     verdict = to_json(error.verdict) if isinstance(error, MoveRefused) else None
     return _refusal(status, type(error).__name__, str(error), verdict)

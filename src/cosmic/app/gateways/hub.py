@@ -89,7 +89,7 @@ class Hub:
             if found.subscription is None:
                 made = found
                 found.subscription = self._station.bus.subscribe(
-                    topic, rule, lambda payload: self._tell(topic, made, payload)
+                    topic, rule, lambda payload: self._publish(topic, made, payload)
                 )
         if found.newest is not None and rule is Rule.LATEST:
             follower(topic, False, found.newest)
@@ -115,7 +115,7 @@ class Hub:
             if each.subscription is not None:
                 each.subscription.close()
 
-    def _tell(self, topic: str, found: _Topic, payload: object) -> None:
+    def _publish(self, topic: str, found: _Topic, payload: object) -> None:
         each = found.rule is Rule.ALL
         now_s = WALL.now_s()
         if not each:

@@ -49,6 +49,13 @@ class Gateways:
                 undo.callback(http.close)
                 said = f" (token {doors.token})" if doors.token else ""
                 self._lines.append(f"HTTP at {http.address}{said}")
+            if doors.epics is not None:
+                require("epics")
+                from cosmic.app.gateways.epics import EpicsGateway
+
+                epics = EpicsGateway(station, hosts, doors.epics, approve)
+                undo.callback(epics.close)
+                self._lines.append(f"EPICS at {epics.address}")
             self._undo = undo.pop_all()
         for line in self._lines:
             logger.info("%s", line.partition(" (token")[0])

@@ -1,0 +1,400 @@
+"""`EpicsGateway`: a station as EPICS records over Channel Access."""
+
+import asyncio
+import json
+import logging
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from itertools import count
+from math import inf, isfinite
+from threading import Lock
+from typing import Any, Final, get_args
+
+import numpy as np
+
+from cosmic.app.configuration.gateways import EpicsSettings
+from cosmic.app.gateways import epics_channels as ca
+from cosmic.app.gateways.catalogue import Command, commands_of
+from cosmic.app.gateways.epics_channels import Channel, ChannelServer, Who
+from cosmic.app.gateways.epics_motor import MotorRecord, ValueRecord
+from cosmic.app.gateways.plain import to_json
+from cosmic.app.gateways.session import Approve, GatewaySession
+from cosmic.daqco.core.chunk import DataChunk
+from cosmic.frame.clock import WALL
+from cosmic.frame.declaration import Declared, declaration_of
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.job_queue import JobQueue
+from cosmic.frame.network.caller import Access
+from cosmic.frame.network.errors import Busy, CallRefused
+from cosmic.frame.network.host import STATE, Host
+from cosmic.frame.network.lease import LeaseState
+from cosmic.frame.network.ongoing import StateMessage
+from cosmic.frame.network.station import LEASE_TOPIC, Station
+from cosmic.frame.network.transport import Rule, Subscription
+from cosmic.frame.operation import Operation
+from cosmic.mico.core.motion.positioner import PositionerState
+from cosmic.mico.hw.interface import PositionerKind
+from cosmic.vico.api.sent_image import SentImage
+
+logger = logging.getLogger(__name__)
+
+SHOWN_EVERY_S: Final = 0.04
+IMAGES_EVERY_S: Final = 0.5
+LARGEST_IMAGE: Final = 4_000_000
+MOST_WAITING: Final = 32
+_PLAIN: Final = (bool, int, float, str)
+
+
+class EpicsGateway:
+    """A station as records; `close` it in every case.
+
+    Each line of a client is a session of its own. It takes the right to move by a put of 1 to
+    PREFIX + "control", and loses it with its line.
+
+    Raises
+    ------
+    NotAvailable
+        It cannot listen there.
+    """
+
+    def __init__(
+        self,
+        station: Station,
+        hosts: Mapping[str, Host],
+        settings: EpicsSettings,
+        approve: Approve | None = None,
+    ) -> None:
+        self._station = station
+        self._hosts = dict(hosts)
+        self._prefix = settings.prefix
+        self._access = Access.MOVE if settings.write else Access.VIEW
+        self._approve = approve
+        self._lock = Lock()
+        self._sessions: dict[tuple[str, int], GatewaySession] = {}
+        self._numbers = count(1)
+        self._queues = {
+            name: JobQueue(f"{name} over EPICS", station.policy)
+            for name in (*hosts, "stops", "reads")
+        }
+        self._newest: dict[str, object] = {}
+        self._subscriptions: list[Subscription] = []
+        self._motors: dict[str, MotorRecord] = {}
+        self._values: dict[str, ValueRecord] = {}
+        self._states: dict[tuple[str, ...], Channel] = {}
+        self._images: dict[str, tuple[Channel, Channel, Channel, Channel]] = {}
+        self._control = ca.whole(put=self._take)
+        self._holder = ca.line()
+        channels = dict(self._all_channels())
+        self._server = ChannelServer(
+            channels,
+            (settings.interface, settings.port),
+            station.policy,
+            self._show,
+            self._gone,
+        )
+        self._follow()
+        self._server.start()
+        try:
+            self._server.wait_started(WALL.sleep)
+        except CosmicError:
+            self.close()
+            raise
+
+    @property
+    def address(self) -> str:
+        """Where it is reached, and what its names begin with."""
+        return f"port {self._server.port}, names begin with {self._prefix}"
+
+    @property
+    def port(self) -> int:
+        """Where it listens."""
+        return self._server.port
+
+    def close(self) -> None:
+        """Stop what clients have set in motion and answer no more; any state."""
+        with self._lock:
+            sessions, self._sessions = list(self._sessions.values()), {}
+        for session in sessions:
+            session.close()
+        self._server.request_end()
+        self._server.join()
+        for each in self._subscriptions:
+            each.close()
+        for queue in self._queues.values():
+            queue.request_end()
+            queue.join()
+
+    # Which records there are
+
+    def _all_channels(self) -> Iterator[tuple[str, Channel]]:
+        yield f"{self._prefix}control", self._control
+        yield f"{self._prefix}control:holder", self._holder
+        for name, host in self._hosts.items():
+            values = host.state(whole=False).values
+            for command in commands_of(name, type(host.served)):
+                for keys in _keys(values, command.place.parts, command.place.keyed):
+                    yield self._command_channel(command, keys)
+            for at, kind in _plain_states(host.served, (name,)):
+                channel = _state_channel(kind)
+                self._states[at] = channel
+                yield self._prefix + _joined(at), channel
+            yield from self._special(name, values)
+
+    def _special(self, name: str, values: Mapping[str, Any]) -> Iterator[tuple[str, Channel]]:
+        for axis, held in values.get("axes", {}).items() if name == "mico" else ():
+            state = held["_latest"]
+            if isinstance(state, PositionerState) and state.kind is not PositionerKind.OPEN_LOOP:
+                motor = MotorRecord(self._prefix + _plain(axis), axis, state, self)
+                self._motors[axis] = motor
+                yield from motor.channels.items()
+        for channel in values["settings"].channel if name == "daqco" else ():
+            record = ValueRecord(self._prefix + _plain(channel.name), "V")
+            self._values[channel.name] = record
+            yield from record.channels.items()
+        for camera in values.get("camera_handles", {}) if name == "vico" else ():
+            base = f"{self._prefix}{_plain(camera)}:image:"
+            found = (ca.pixels(LARGEST_IMAGE), ca.whole(), ca.whole(), ca.whole())
+            self._images[camera] = found
+            names = ("ArrayData", "ArraySize0_RBV", "ArraySize1_RBV", "UniqueId_RBV")
+            yield from zip((base + each for each in names), found, strict=True)
+
+    def _command_channel(self, command: Command, keys: tuple[str, ...]) -> tuple[str, Channel]:
+        async def put(who: Who, said: str) -> None:
+            channel = made
+            try:
+                arguments = json.loads(said or "{}")
+            except (ValueError, RecursionError) as exc:
+                raise CallRefused(f"arguments are JSON: {str(exc)[:100]}") from exc
+            if not isinstance(arguments, dict):
+                raise CallRefused("arguments are a JSON object, by their names")
+            try:
+                result = await self._carried_out(who, command, arguments, keys)
+            except CosmicError as exc:
+                await _answer(channel, {"error": str(exc)[:1000]})
+                raise
+            await _answer(channel, {"result": to_json(result)})
+
+        made = ca.text("{}", put=put)
+        steps = [command.place.application, *_steps(command.place.parts, command.place.keyed, keys)]
+        return self._prefix + _joined((*steps, command.declared.name)), made
+
+    # Commands
+
+    async def run(
+        self, who: Who, function: str, arguments: dict[str, Any], keys: tuple[str, ...]
+    ) -> None:
+        """Carry out a command of MiCo and await its end; raises `CosmicError`."""
+        await self._run(who, "mico", function, arguments, keys)
+
+    async def look(self, axis: str) -> PositionerState:
+        """Return the newest state of an axis."""
+        host = self._hosts["mico"]
+        job = self._queues["reads"].submit(lambda: host.state(whole=False).values, "state")
+        await _ended(job)
+        held: Any = job.result["axes"]
+        found: PositionerState = held[axis]["_latest"]
+        return found
+
+    async def _carried_out(
+        self, who: Who, command: Command, arguments: dict[str, Any], keys: tuple[str, ...]
+    ) -> object:
+        application = command.place.application
+        return await self._run(who, application, command.function, arguments, keys)
+
+    async def _run(
+        self,
+        who: Who,
+        application: str,
+        function: str,
+        arguments: dict[str, Any],
+        keys: tuple[str, ...],
+    ) -> object:
+        session = self._session(who)
+        order = session.order(application, function, arguments, keys)
+        queue = self._queues["stops" if order.found.mark.at_once else application]
+        if queue.waiting >= MOST_WAITING:
+            raise Busy(f"too many commands wait for {application}")
+        job = queue.submit(lambda: session.carry_out(order), order.title)
+        await _ended(job)
+        result = job.result
+        if isinstance(result, Operation):
+            await _ended(result)
+            return result.result
+        return result
+
+    async def _take(self, who: Who, value: int) -> None:
+        session = self._session(who)
+        if value:
+            session.take_control(in_process=True)  # its line is watched instead
+        else:
+            session.release_control()
+        await self._show_one(LEASE_TOPIC, self._station.lease.state)
+
+    def _session(self, who: Who) -> GatewaySession:
+        with self._lock:
+            found = self._sessions.get(who.address)
+            if found is None:
+                name = f"EPICS {who.user[:20]} {who.host[:20]} {next(self._numbers)}"
+                found = GatewaySession(self._station, name, self._access, self._approve)
+                self._sessions[who.address] = found
+        return found
+
+    def _gone(self, address: tuple[str, int]) -> None:
+        with self._lock:
+            found = self._sessions.pop(address, None)
+        if found is not None:
+            self._queues["stops"].submit(lambda: found.close(f"{found.name} is gone"), "gone")
+
+    # What is shown
+
+    def _follow(self) -> None:
+        topics = [LEASE_TOPIC, *(f"{name}/{STATE}" for name in self._hosts)]
+        topics += ["daqco/display"] if "daqco" in self._hosts else []
+        topics += [f"vico/camera_handles/{each}/shown" for each in self._images]
+        self._newest[LEASE_TOPIC] = self._station.lease.state
+        for topic in topics:
+            bus = self._station.bus
+            self._subscriptions.append(bus.subscribe(topic, Rule.LATEST, self._taker(topic)))
+
+    def _taker(self, topic: str) -> Callable[[object], None]:
+        def take(payload: object) -> None:
+            self._newest[topic] = payload
+
+        return take
+
+    async def _show(self) -> None:
+        shown: dict[str, object] = {}
+        images_due_s = 0.0
+        while True:
+            await asyncio.sleep(SHOWN_EVERY_S)
+            now_s = WALL.now_s()
+            images = now_s >= images_due_s
+            if images:
+                images_due_s = now_s + IMAGES_EVERY_S
+            for topic, payload in list(self._newest.items()):
+                if shown.get(topic) is payload or (topic.endswith("/shown") and not images):
+                    continue
+                shown[topic] = payload
+                await self._show_one(topic, payload)
+
+    async def _show_one(self, topic: str, payload: object) -> None:
+        if isinstance(payload, StateMessage):
+            await self._show_state(topic.partition("/")[0], payload.values)
+        elif isinstance(payload, LeaseState):
+            await ca.show(self._holder, payload.holder[:39])
+            await ca.show(self._control, int(not payload.local))
+        elif isinstance(payload, DataChunk):
+            await self._show_samples(payload)
+        elif isinstance(payload, SentImage) and payload.data.size <= LARGEST_IMAGE:
+            array, width, height, number = self._images[payload.camera]
+            await ca.show(width, int(payload.data.shape[1]))
+            await ca.show(height, int(payload.data.shape[0]))
+            if payload.data.dtype == np.uint8:
+                await ca.show(array, payload.data.tobytes())
+            await ca.show(number, payload.frame_id & 0x7FFFFFFF)
+
+    async def _show_state(self, application: str, values: Mapping[str, Any]) -> None:
+        if application == "mico":
+            for axis, motor in self._motors.items():
+                held = values["axes"].get(axis)
+                if held is not None:
+                    await motor.show(held["_latest"])
+        for at, channel in self._states.items():
+            if at[0] != application:
+                continue
+            value: Any = values
+            for step in at[1:]:
+                value = value.get(step) if isinstance(value, Mapping) else None
+            if value is not None:
+                await _show_plain(channel, value)
+
+    async def _show_samples(self, chunk: DataChunk) -> None:
+        served: Any = self._hosts["daqco"].served
+        limits = {each.channel: each for each in served.limits_there}
+        for row, name in enumerate(chunk.channels):
+            record = self._values.get(name)
+            if record is not None:
+                limit, scale = limits.get(name), chunk.scales[row]
+                low, high = (limit.low, limit.high) if limit is not None else (-inf, inf)
+                await record.show(scale.apply(chunk.volts[row]), scale.unit, low, high)
+
+
+async def _ended(operation: Operation[Any]) -> None:
+    """Wait until an operation has ended; the loop goes on meanwhile."""
+    loop, ended = asyncio.get_running_loop(), asyncio.Event()
+
+    def wake(_operation: object) -> None:
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(ended.set)
+
+    operation.add_callback(wake)
+    await ended.wait()
+
+
+async def _answer(channel: Channel, said: dict[str, Any]) -> None:
+    coded = json.dumps(said)
+    await channel.write(coded if len(coded) < ca.JSON_LENGTH else '{"result": "too large"}')
+
+
+def _plain(name: str) -> str:
+    return name.replace(".", "_")
+
+
+def _joined(steps: tuple[str, ...]) -> str:
+    return ":".join(_plain(each) for each in steps)
+
+
+def _steps(parts: tuple[str, ...], keyed: tuple[bool, ...], keys: tuple[str, ...]) -> Iterator[str]:
+    left = iter(keys)
+    for part, with_key in zip(parts, keyed, strict=True):
+        yield part
+        if with_key:
+            yield next(left)
+
+
+def _keys(
+    values: Any, parts: tuple[str, ...], keyed: tuple[bool, ...]
+) -> Iterator[tuple[str, ...]]:
+    """Yield the keys that lead to each object that there is."""
+    if not parts:
+        yield ()
+        return
+    inner = values.get(parts[0])
+    if inner is None:
+        return
+    if not keyed[0]:
+        yield from _keys(inner, parts[1:], keyed[1:])
+        return
+    for key, held in inner.items():
+        for rest in _keys(held, parts[1:], keyed[1:]):
+            yield (key, *rest)
+
+
+def _plain_states(served: Declared, at: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield where each state is that is a number, a truth value or a text, and of which kind."""
+    declaration = declaration_of(type(served))
+    for name, each in declaration.state.items():
+        kinds = [kind for kind in (get_args(each.kind) or (each.kind,)) if kind in _PLAIN]
+        if kinds and not each.fixed:
+            yield (*at, name), kinds[0]
+    for name, part in declaration.parts.items():
+        found = getattr(served, name)
+        inner = found.items() if part.keyed else [("", found)]
+        for key, held in inner:
+            if held is not None:
+                yield from _plain_states(held, (*at, name, key) if key else (*at, name))
+
+
+def _state_channel(kind: Any) -> Channel:
+    if kind is str:
+        return ca.text(length=500)
+    return ca.number() if kind is float else ca.whole()
+
+
+async def _show_plain(channel: Channel, value: object) -> None:
+    if isinstance(value, str):
+        await ca.show(channel, value[:499])
+    elif isinstance(value, float):
+        await ca.show(channel, value, ca.NO_ALARM if isfinite(value) else ca.UNKNOWN)
+    elif isinstance(value, int):
+        await ca.show(channel, max(-(2**31), min(2**31 - 1, int(value))))

@@ -1,0 +1,316 @@
+"""Channels of Channel Access and the server for them: the file that wraps caproto."""
+
+import asyncio
+import logging
+import socket
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Final
+
+import caproto
+import numpy as np
+from caproto import AlarmSeverity, AlarmStatus, CAStatus
+from caproto._utils import ConversionDirection
+from caproto.asyncio.server import Context
+from typing_extensions import override
+
+from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.errors import CallRefused
+from cosmic.frame.threads import WorkerThread
+
+logger = logging.getLogger(__name__)
+
+MOST_CLIENTS: Final = 64
+JSON_LENGTH: Final = 16_000
+_START_S: Final = 10.0
+_ALIVE_S: Final = 1
+"""How long a line may be silent until the system looks whether its other end is there."""
+_MOST_MISSED: Final = 2
+
+_DONE: Final = int(CAStatus.ECA_NORMAL.value.code_with_severity)
+_REFUSED: Final = int(CAStatus.ECA_PUTFAIL.value.code_with_severity)
+
+NO_ALARM: Final = (AlarmStatus.NO_ALARM, AlarmSeverity.NO_ALARM)
+UNKNOWN: Final = (AlarmStatus.UDF, AlarmSeverity.INVALID_ALARM)
+FAULT: Final = (AlarmStatus.STATE, AlarmSeverity.MAJOR_ALARM)
+TOO_HIGH: Final = (AlarmStatus.HIHI, AlarmSeverity.MAJOR_ALARM)
+TOO_LOW: Final = (AlarmStatus.LOLO, AlarmSeverity.MAJOR_ALARM)
+ALARMS: Final = {
+    "STOPPED": (AlarmStatus.DISABLE, AlarmSeverity.MAJOR_ALARM),
+    "NO_LEASE": (AlarmStatus.WRITE_ACCESS, AlarmSeverity.MAJOR_ALARM),
+    "LIMIT": (AlarmStatus.HWLIMIT, AlarmSeverity.MAJOR_ALARM),
+    "POSITION_UNKNOWN": UNKNOWN,
+    "COLLISION": (AlarmStatus.SOFT, AlarmSeverity.MAJOR_ALARM),
+    "NO_ANSWER": (AlarmStatus.TIMEOUT, AlarmSeverity.MAJOR_ALARM),
+    "DEVICE": (AlarmStatus.COMM, AlarmSeverity.MAJOR_ALARM),
+}
+"""Alarm of a refused move, by the reason of its verdict."""
+
+Alarm = tuple[AlarmStatus, AlarmSeverity]
+Channel = Any
+"""A channel of caproto, which has no types."""
+
+
+@dataclass(frozen=True, slots=True)
+class Who:
+    """A client that writes: its line, and what it says of itself, which is not proven."""
+
+    address: tuple[str, int]
+    host: str
+    user: str
+
+
+Put = Callable[[Who, Any], Awaitable[None]]
+"""`put(who, value)` carries out a write; what it raises refuses it."""
+
+
+class PutRefused(Exception):  # noqa: N818 - reads as what happened
+    """A write that was not carried out; the text says why."""
+
+
+def number(
+    value: float = 0.0,
+    *,
+    put: Put | None = None,
+    units: str = "",
+    limits: tuple[float, float] | None = None,
+    precision: int = 4,
+) -> Channel:
+    """Return a channel with a float."""
+    low, high = limits or (0.0, 0.0)
+    made = caproto.ChannelDouble(
+        value=value,
+        units=units,
+        precision=precision,
+        lower_ctrl_limit=low,
+        upper_ctrl_limit=high,
+        lower_disp_limit=low,
+        upper_disp_limit=high,
+    )
+    return _guarded(made, put)
+
+
+def whole(value: int = 0, *, put: Put | None = None) -> Channel:
+    """Return a channel with a whole number."""
+    return _guarded(caproto.ChannelInteger(value=value), put)
+
+
+def choice(words: Sequence[str], value: int = 0, *, put: Put | None = None) -> Channel:
+    """Return a channel with one of a few words."""
+    return _guarded(caproto.ChannelEnum(value=words[value], enum_strings=list(words)), put)
+
+
+def line(value: str = "", *, put: Put | None = None) -> Channel:
+    """Return a channel with a text of up to 39 letters."""
+    return _guarded(caproto.ChannelString(value=value[:39], string_encoding="utf-8"), put)
+
+
+def text(value: str = "", *, put: Put | None = None, length: int = JSON_LENGTH) -> Channel:
+    """Return a channel with a long text, as an array of characters."""
+    made = caproto.ChannelChar(value=value, max_length=length, string_encoding="utf-8")
+    return _guarded(made, put)
+
+
+def wave(length: int, units: str = "") -> Channel:
+    """Return a channel with an array of floats."""
+    return _guarded(caproto.ChannelDouble(value=[0.0], max_length=length, units=units), None)
+
+
+def pixels(length: int) -> Channel:
+    """Return a channel with an array of bytes."""
+    return _guarded(caproto.ChannelByte(value=b"\0", max_length=length), None)
+
+
+async def show(channel: Channel, value: object, alarm: Alarm = NO_ALARM, **more: Any) -> None:
+    """Publish a value with its alarm, unless it was published last."""
+    said = (value if not isinstance(value, np.ndarray) else id(value), alarm, tuple(more.items()))
+    if getattr(channel, "said", None) == said:
+        return
+    channel.said = said
+    status, severity = alarm
+    await channel.write(value, status=status, severity=severity, **more)
+
+
+def _guarded(channel: Channel, put: Put | None) -> Channel:
+    """Have clients write through `put`; without it they may only read."""
+    rights = caproto.AccessRights.READ
+    if put is not None:
+        rights |= caproto.AccessRights.WRITE
+    channel.check_access = lambda _host, _user: rights
+
+    async def auth_write(
+        host: str,
+        user: str,
+        data: Any,
+        data_type: Any,
+        _metadata: Any,
+        *,
+        flags: int = 0,
+        user_address: tuple[str, int] = ("", 0),
+    ) -> int:
+        del flags
+        if put is None:
+            return _REFUSED
+        who = Who((user_address[0], user_address[1]), str(host), str(user))
+        try:
+            await put(who, _value(channel, data, data_type))
+        except (CosmicError, PutRefused) as exc:
+            logger.info("EPICS: %s of %s: a write was refused: %s", who.user, who.host, exc)
+            return _REFUSED
+        return _DONE
+
+    channel.auth_write = auth_write
+    return channel
+
+
+def _value(channel: Channel, data: Any, data_type: Any) -> Any:
+    try:
+        found = caproto.backend.convert_values(
+            values=data,
+            from_dtype=caproto.native_type(data_type),
+            to_dtype=channel.data_type,
+            string_encoding=channel.string_encoding,
+            enum_strings=getattr(channel, "enum_strings", None),
+            direction=ConversionDirection.FROM_WIRE,
+        )
+        return channel.preprocess_value(found)
+    except (caproto.CaprotoError, ValueError, TypeError, IndexError, KeyError) as exc:
+        raise CallRefused(f"what was written is of a wrong kind: {str(exc)[:100]}") from exc
+
+
+class ChannelServer(WorkerThread):
+    """Serves channels in a thread with an event loop; at last `request_end` and `join`.
+
+    Parameters
+    ----------
+    run : callable
+        `run()` is awaited in the loop beside the server; it shows what changes.
+    on_gone : callable
+        `on_gone(address)` is called when the line of a client has ended.
+    """
+
+    def __init__(
+        self,
+        channels: Mapping[str, Channel],
+        where: tuple[str, int],
+        policy: FailurePolicy,
+        run: Callable[[], Awaitable[None]],
+        on_gone: Callable[[tuple[str, int]], None],
+    ) -> None:
+        super().__init__("EPICS server", policy)
+        logging.getLogger("caproto").setLevel(logging.ERROR)  # it logs each client that comes
+        self._channels = dict(channels)
+        self._interface, self._port = where
+        self._run = run
+        self._on_gone = on_gone
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._ending: asyncio.Event | None = None
+        self._problem = ""
+        self._listening_at = 0
+
+    @property
+    def port(self) -> int:
+        """Where it listens; 0 while it does not."""
+        return self._listening_at
+
+    @property
+    def problem(self) -> str:
+        """Why it does not listen; empty while it does."""
+        return self._problem
+
+    @override
+    def run_body(self) -> None:
+        asyncio.run(self._serve())
+
+    async def _serve(self) -> None:
+        self._loop, self._ending = asyncio.get_running_loop(), asyncio.Event()
+        if self.end_requested:
+            return
+        context = Context(self._channels, [self._interface])
+        if self._port:
+            context.ca_server_port = self._port
+        inner = context.circuit_disconnected
+        accept = context.tcp_handler
+
+        async def gone(circuit: Any) -> None:
+            self._on_gone(tuple(circuit.circuit.address))
+            await inner(circuit)
+
+        async def come(client: Any, address: Any) -> None:
+            if len(context.circuits) >= MOST_CLIENTS:
+                client.writer.close()
+                return
+            _keep_watch(client)
+            await accept(client, address)
+
+        context.circuit_disconnected, context.tcp_handler = gone, come
+        context.broadcast_beacon_loop = _nothing  # it would tell the whole network
+        serving = asyncio.ensure_future(context.run())
+        showing = asyncio.ensure_future(self._run())
+        ending = asyncio.ensure_future(self._ending.wait())
+        noting = asyncio.ensure_future(self._note_port(context))
+        try:
+            await asyncio.wait((serving, showing, ending), return_when=asyncio.FIRST_COMPLETED)
+            for each in (serving, showing):
+                if each.done() and not each.cancelled() and each.exception() is not None:
+                    self._problem = str(each.exception())
+                    logger.error("the EPICS server ended: %s", self._problem)
+        finally:
+            for each in (serving, showing, ending, noting):
+                each.cancel()
+            for each in (serving, showing, ending, noting):
+                with suppress(asyncio.CancelledError, Exception):
+                    await asyncio.wait_for(each, 2.0)
+
+    async def _note_port(self, context: Any) -> None:
+        while context.port is None or not context.udp_socks:
+            await asyncio.sleep(0.01)
+        self._listening_at = int(context.port)
+
+    @override
+    def request_end(self) -> None:
+        super().request_end()
+        loop, ending = self._loop, self._ending
+        if loop is not None and ending is not None:
+            with suppress(RuntimeError):
+                loop.call_soon_threadsafe(ending.set)
+
+    def wait_started(self, sleep: Callable[[float], None]) -> None:
+        """Wait until it listens.
+
+        Raises
+        ------
+        NotAvailable
+            It cannot.
+        """
+        for _ in range(round(_START_S / 0.02)):
+            if self._listening_at or self._problem:
+                break
+            sleep(0.02)
+        if not self._listening_at:
+            raise NotAvailable(
+                f"EPICS cannot listen at {self._interface}: {self._problem or 'no answer'}"
+            )
+
+
+async def _nothing() -> None:
+    await asyncio.Event().wait()
+
+
+def _keep_watch(client: Any) -> None:
+    """Have the system notice a line whose other end is gone, within 3 s."""
+    bound = client.writer.get_extra_info("socket")
+    options = (
+        ("SO_KEEPALIVE", socket.SOL_SOCKET, 1),
+        ("TCP_KEEPIDLE", socket.IPPROTO_TCP, _ALIVE_S),
+        ("TCP_KEEPINTVL", socket.IPPROTO_TCP, _ALIVE_S),
+        ("TCP_KEEPCNT", socket.IPPROTO_TCP, _MOST_MISSED),
+        ("TCP_USER_TIMEOUT", socket.IPPROTO_TCP, 1000 * _ALIVE_S * (_MOST_MISSED + 1)),
+    )
+    for name, level, value in options:
+        option = getattr(socket, name, None)  # not every system has all of them
+        if option is not None and bound is not None:
+            with suppress(OSError):
+                bound.setsockopt(level, option, value)

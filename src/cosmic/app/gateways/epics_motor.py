@@ -1,0 +1,234 @@
+"""`MotorRecord`: an axis as EPICS knows motors, and `ValueRecord`: a measured value."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from math import inf, isfinite
+from typing import Any, Final, Protocol
+
+from cosmic.app.gateways import epics_channels as ca
+from cosmic.app.gateways.epics_channels import Alarm, Channel, PutRefused, Who
+from cosmic.frame.errors import CosmicError, MoveRefused
+from cosmic.mico.core.motion.positioner import PositionerState
+
+SETTLED_S: Final = 0.05
+"""Between the last position and the end of a put: clients get monitors in bundles."""
+EDGE_S: Final = 0.02
+SMALLEST_STEP: Final = 0.001
+"""What `MRES` and the deadband say, in units of the axis."""
+NOMINAL_STEP_UM: Final = 0.5
+"""A guess: about how far one step of a stick-slip stage goes. Only `VELO` is made of it."""
+
+Run = Callable[[Who, str, dict[str, Any], tuple[str, ...]], Awaitable[Any]]
+"""`run(who, function, arguments, keys)` carries out a command of MiCo and awaits its end."""
+Look = Callable[[str], Awaitable[PositionerState]]
+
+
+class Commander(Protocol):
+    """Who carries out what records want."""
+
+    async def run(
+        self, who: Who, function: str, arguments: dict[str, Any], keys: tuple[str, ...]
+    ) -> None:
+        """Carry out a command of MiCo and await its end; raises `CosmicError`."""
+
+    async def look(self, axis: str) -> PositionerState:
+        """Return the newest state of an axis."""
+
+
+class MotorRecord:
+    """A motor record in front of one axis; in the loop of the server.
+
+    VAL and RBV count from the user's zero, DVAL and DRBV in gate coordinates. A put to VAL ends
+    when the axis is at rest; what is refused fails the put, and raises the alarm of RBV.
+
+    Parameters
+    ----------
+    name : str
+        Of the record, such as "COSMIC:left_x".
+    """
+
+    def __init__(self, name: str, axis: str, state: PositionerState, commander: Commander) -> None:
+        self._axis = axis
+        self._unit = state.unit
+        self._zero = state.zero
+        self._commander = commander
+        self._moves = 0
+        self._alarm: Alarm = ca.NO_ALARM
+        limits = state.limits or (0.0, 0.0)
+        place = state.position or 0.0
+        units = "um" if state.unit == "um" else "deg"
+
+        def axis_number(value: float, put: ca.Put | None = None) -> Channel:
+            return ca.number(value, put=put, units=units, limits=limits)
+
+        self._fields: dict[str, Channel] = {
+            "VAL": axis_number(place - state.zero, self._go),
+            "RBV": axis_number(place - state.zero),
+            "DVAL": axis_number(place, self._go_dial),
+            "DRBV": axis_number(place),
+            "RLV": axis_number(0.0, self._go_by),
+            "TWV": axis_number(1.0, self._keep("TWV")),
+            "TWF": ca.whole(put=self._tweak(1.0)),
+            "TWR": ca.whole(put=self._tweak(-1.0)),
+            "STOP": ca.whole(put=self._halt),
+            "DMOV": ca.whole(1),
+            "MOVN": ca.whole(0),
+            "HLM": axis_number(limits[1]),
+            "LLM": axis_number(limits[0]),
+            "DHLM": axis_number(limits[1]),
+            "DLLM": axis_number(limits[0]),
+            "OFF": axis_number(-state.zero),
+            "VELO": axis_number(NOMINAL_STEP_UM * state.frequency_range_hz[1]),
+            "VMAX": axis_number(NOMINAL_STEP_UM * state.frequency_range_hz[1]),
+            "EGU": ca.line(units),
+            "DESC": ca.line(state.name),
+            "DIR": ca.choice(("Pos", "Neg")),
+            "FOFF": ca.choice(("Variable", "Frozen"), 1),
+            "SET": ca.choice(("Use", "Set")),
+            "SPMG": ca.choice(("Stop", "Pause", "Move", "Go"), 3),
+            "ACCL": ca.number(0.1),
+            "MRES": ca.number(SMALLEST_STEP),
+            "ERES": ca.number(SMALLEST_STEP),
+            "SREV": ca.whole(1000),
+            "UREV": ca.number(1.0),
+            "RDBD": ca.number(SMALLEST_STEP),
+            "PREC": ca.whole(4),
+            "HLS": ca.whole(0),
+            "LLS": ca.whole(0),
+            "TDIR": ca.whole(0),
+            "HOMF": ca.whole(put=self._home),
+            "HOMR": ca.whole(put=self._home),
+            "OUT": ca.line("@cosmic"),
+            "RTYP": ca.line("motor"),
+            "STAT": ca.whole(0),
+            "SEVR": ca.whole(0),
+        }
+        self._reason = ca.text(length=500)
+        self.channels = {name: self._fields["VAL"], f"{name}:reason": self._reason}
+        self.channels |= {f"{name}.{field}": each for field, each in self._fields.items()}
+
+    async def show(self, state: PositionerState) -> None:
+        """Show the axis as it is."""
+        self._zero = state.zero
+        fields, alarm = self._fields, self._state_alarm(state)
+        if state.position is not None:
+            await ca.show(fields["RBV"], state.position - state.zero, alarm)
+            await ca.show(fields["DRBV"], state.position, alarm)
+        else:
+            await ca.show(fields["RBV"], fields["RBV"].value, alarm)
+        await ca.show(fields["STAT"], int(alarm[0]))
+        await ca.show(fields["SEVR"], int(alarm[1]))
+        low, high = state.limits or (0.0, 0.0)
+        for field, value in (("LLM", low - state.zero), ("HLM", high - state.zero)):
+            await ca.show(fields[field], value)
+        await ca.show(fields["OFF"], -state.zero)
+        if not self._moves:
+            await self._show_moving(moving=state.in_motion)
+
+    async def _show_moving(self, *, moving: bool) -> None:
+        await ca.show(self._fields["MOVN"], int(moving))
+        await ca.show(self._fields["DMOV"], int(not moving))
+
+    def _state_alarm(self, state: PositionerState) -> Alarm:
+        if state.error or not state.present:
+            return ca.FAULT
+        return ca.UNKNOWN if state.position is None else self._alarm
+
+    # What is written
+
+    async def _go(self, who: Who, value: float) -> None:
+        await self._move(who, self._to(value + self._zero), value)
+
+    async def _go_dial(self, who: Who, value: float) -> None:
+        await self._move(who, self._to(value), value - self._zero)
+
+    async def _go_by(self, who: Who, value: float) -> None:
+        motion = {"kind": "MoveBy", "distance": float(value), "unit": self._unit}
+        await self._move(who, motion, None)
+
+    def _to(self, target: float) -> dict[str, Any]:
+        return {"kind": "MoveTo", "target": float(target), "unit": self._unit}
+
+    def _tweak(self, sign: float) -> ca.Put:
+        async def tweak(who: Who, value: int) -> None:
+            if value:
+                await self._go_by(who, sign * float(self._fields["TWV"].value))
+
+        return tweak
+
+    def _keep(self, field: str) -> ca.Put:
+        async def keep(_who: Who, value: float) -> None:
+            if not isfinite(value):
+                raise PutRefused("a step is a finite number")
+            await self._fields[field].write(value)
+
+        return keep
+
+    async def _home(self, who: Who, value: int) -> None:
+        if value:
+            await self._move(who, {"kind": "Reference"}, None)
+
+    async def _halt(self, who: Who, value: int) -> None:
+        if value:
+            await self._commander.run(who, "axes.halt", {"why": "stop from EPICS"}, (self._axis,))
+
+    async def _move(self, who: Who, motion: dict[str, Any], shown: float | None) -> None:
+        """Carry out one motion; the record says that it moves until the axis is at rest."""
+        self._moves += 1
+        self._alarm = ca.NO_ALARM
+        failure: CosmicError | None = None
+        if shown is not None:
+            await self._fields["VAL"].write(shown)
+        await self._show_moving(moving=True)
+        try:
+            await self._commander.run(who, "axes.begin", {"motion": motion}, (self._axis,))
+        except CosmicError as exc:
+            failure = exc
+        finally:
+            self._moves -= 1
+        self._alarm = _alarm_of(failure)
+        await ca.show(self._reason, "" if failure is None else str(failure)[:499])
+        state = await self._commander.look(self._axis)
+        await self.show(state)
+        if not self._moves and not state.in_motion:
+            await asyncio.sleep(EDGE_S)
+            await self._show_moving(moving=False)
+        await asyncio.sleep(SETTLED_S)
+        if failure is not None:
+            raise PutRefused(str(failure))
+
+
+def _alarm_of(failure: CosmicError | None) -> Alarm:
+    if failure is None:
+        return ca.NO_ALARM
+    reason = failure.verdict.reason.name if isinstance(failure, MoveRefused) else ""
+    return ca.ALARMS.get(reason, ca.FAULT)
+
+
+class ValueRecord:
+    """The newest value of a channel of DAQCo with the limits in force, and its newest samples."""
+
+    def __init__(self, name: str, unit: str) -> None:
+        self._value = ca.number(units=unit)
+        self._wave = ca.wave(20_000, unit)
+        self._unit = ca.line(unit)
+        self.channels = {
+            name: self._value,
+            f"{name}.VAL": self._value,
+            f"{name}.EGU": self._unit,
+            f"{name}:wave": self._wave,
+        }
+
+    async def show(self, samples: Any, unit: str, low: float, high: float) -> None:
+        """Show samples in physical units; beyond `low` and `high` they are an alarm."""
+        value = float(samples.mean())
+        alarm = ca.TOO_HIGH if value > high else ca.TOO_LOW if value < low else ca.NO_ALARM
+        if not isfinite(value):
+            alarm = ca.UNKNOWN
+        bounds = {
+            "upper_alarm_limit": high if high < inf else 0.0,
+            "lower_alarm_limit": low if low > -inf else 0.0,
+        }
+        await ca.show(self._value, value, alarm, units=unit, **bounds)
+        await ca.show(self._wave, samples, alarm)
+        await ca.show(self._unit, unit[:39])

@@ -1,0 +1,155 @@
+"""EPICS: what is declared is a record; puts pass the lease, and who dies leaves nothing moving."""
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from contract.station_rig import free_port, wait_until
+from contract.test_declaration import Cabinet, WithBell
+from cosmic.app.configuration.gateways import EpicsSettings
+from cosmic.app.gateways.epics import EpicsGateway
+from cosmic.frame.failure import Failure, FailurePolicy
+from cosmic.frame.network.host import Host
+from cosmic.frame.network.station import Station
+
+CHILD = Path(__file__).with_name("epics_child.py")
+
+
+class Client:
+    """A client in a process of its own."""
+
+    def __init__(self, port: int) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, str(CHILD), str(port)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def ask(self, operation: str, name: str, value: object = None) -> Any:
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.write(json.dumps([operation, name, value]) + "\n")
+        self.process.stdin.flush()
+        return json.loads(self.process.stdout.readline())
+
+    def put(self, name: str, value: object) -> bool:
+        return bool(self.ask("put", name, value))
+
+    def get(self, name: str) -> Any:
+        return self.ask("get", name)
+
+    def end(self) -> None:
+        self.process.kill()
+        self.process.wait(10)
+        for pipe in (self.process.stdin, self.process.stdout):
+            assert pipe is not None
+            pipe.close()
+
+
+@dataclass
+class Door:
+    home: Cabinet
+    station: Station
+    port: int
+    failures: list[Failure]
+
+
+@contextmanager
+def opened(kind: type[Cabinet] = Cabinet, *, write: bool = True) -> Iterator[Door]:
+    home, policy = kind(), FailurePolicy()
+    failures: list[Failure] = []
+    policy.subscribe(failures.append)
+    station = Station("fibres", policy)
+    host = Host("cabinet", home)
+    station.host("cabinet", host)
+    settings = EpicsSettings(prefix="T:", port=free_port(), write=write)
+    gateway = EpicsGateway(station, {"cabinet": host}, settings)
+    try:
+        yield Door(home, station, gateway.port, failures)
+    finally:
+        gateway.close()
+        host.close()
+
+
+@contextmanager
+def used(door: Door) -> Iterator[Client]:
+    client = Client(door.port)
+    try:
+        yield client
+    finally:
+        client.end()
+
+
+def test_a_command_declared_tomorrow_is_a_record_without_a_line_of_code() -> None:
+    with opened(WithBell) as door, used(door) as client:
+        assert client.put("T:cabinet:ring", '{"times": 2}')
+        assert json.loads(client.get("T:cabinet:ring")) == {"result": "ding ding "}
+        assert isinstance(door.home, WithBell)
+        assert door.home.rung == [2]
+        assert not client.put("T:cabinet:ring", '{"times": "2"}')
+        assert "times" in json.loads(client.get("T:cabinet:ring"))["error"]
+        assert not client.put("T:cabinet:ring", "[1")
+        assert door.home.rung == [2]
+
+
+def test_what_moves_needs_the_right_and_ends_with_the_client() -> None:
+    with opened() as door:
+        with used(door) as client:
+            move = "T:cabinet:drawers:left_x:move"
+            assert not client.put(move, '{"target_um": 5.0}')
+            assert door.home.drawers["left.x"].moved_um == []
+            assert client.put("T:control", 1)
+            assert client.get("T:control:holder").startswith("EPICS")
+            assert client.put(move, '{"target_um": 5.0}')
+            assert door.home.drawers["left.x"].moved_um == [5.0]
+            state = "T:cabinet:drawers:left_x:position_um"
+            assert wait_until(lambda: client.get(state) == 5.0)
+            dead_man = door.home.drawers["left.x"].dead_men[-1]
+            assert not dead_man.expired
+            client.process.send_signal(signal.SIGKILL)
+            assert wait_until(lambda: dead_man.expired, 1.0)
+            assert wait_until(lambda: door.station.lease.state.local)
+        assert not door.failures
+
+
+def test_a_gateway_that_only_shows_still_lets_everybody_stop() -> None:
+    with opened(write=False) as door, used(door) as client:
+        assert not client.put("T:control", 1)
+        assert not client.put("T:cabinet:apply", '{"settings": {"name": "x"}}')
+        assert client.put("T:cabinet:stop", "{}")
+        assert door.home.stops == 1
+        assert door.home.name == "lamp"
+
+
+def test_bytes_that_are_no_channel_access_harm_nobody() -> None:
+    with opened() as door, used(door) as client:
+        lines = []
+        for number in range(40):
+            raw = socket.create_connection(("127.0.0.1", door.port))
+            raw.sendall(bytes([number, 255 - number]) * 500)
+            lines.append(raw)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as search:
+            for number in range(200):
+                search.sendto(bytes([number % 256]) * 40, ("127.0.0.1", door.port))
+        assert client.put("T:cabinet:stop", "{}")
+        assert door.home.stops == 1
+        for raw in lines:
+            raw.close()
+        assert not door.failures
+
+
+@pytest.mark.parametrize("prefix", ["", "COSMIC:", "BL-1.2:"])
+def test_a_prefix_is_what_epics_takes(prefix: str) -> None:
+    assert EpicsSettings(prefix=prefix).prefix == prefix
+    with pytest.raises(ValueError, match="prefix"):
+        EpicsSettings(prefix="no spaces")
