@@ -16,7 +16,7 @@ from contract import fake_nidaqmx
 from contract.board_rig import NidaqmxRig, failure_of, one_input, received, some_inputs
 from cosmic.daqco.hw import nidaqmx_board
 from cosmic.daqco.hw.interface import BoardChunk, InputMode, OverrunError
-from cosmic.daqco.hw.nidaqmx_errors import STATUS, board_error, status_error
+from cosmic.daqco.hw.nidaqmx_errors import STATUS, TABLE, board_error
 from cosmic.daqco.hw.nidaqmx_library import NidaqmxLibrary
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import (
@@ -491,7 +491,7 @@ def test_an_error_of_the_driver_is_reported_with_board_code_and_advice(
 
 @pytest.mark.parametrize("code", [-200332, -200335, -200331, -200081, -200579, -200580])
 def test_a_rate_or_range_that_the_driver_refuses_is_a_limit(code: int) -> None:
-    error = status_error(code, "configure", "Dev1")
+    error = TABLE.error(code, "configure", "Dev1")
     assert isinstance(error, LimitError)
     assert "Dev1" in str(error) and str(code) in str(error)
 

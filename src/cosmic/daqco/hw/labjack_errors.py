@@ -1,42 +1,20 @@
 """LJM's errors as CoSMic exceptions, by their numbers (LJM error codes, LabJack)."""
 
-from dataclasses import dataclass
 from typing import Any, Final
 
-from cosmic.daqco.hw.interface import OverrunError
+from cosmic.daqco.hw.board_errors import TOO_FAST, Beyond, ErrorTable, Status
 from cosmic.frame.errors import (
     CosmicError,
     DeviceError,
     DeviceFault,
     DeviceTimeout,
-    LimitError,
     NotConnectedError,
 )
-from cosmic.frame.verdict import Reason, refuse
 
 LATE: Final = (
     "they were not fetched in time; close what slows the computer, choose longer chunks (chunk_s), "
     "a lower rate, or Ethernet in place of USB, and start again"
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Status:
-    """What one error number of LJM means.
-
-    Attributes
-    ----------
-    fault : DeviceFault
-        The same in CoSMic's words.
-    text : str
-        What happened and what the operator can do.
-    kind : type of DeviceError
-        The exception that says it.
-    """
-
-    fault: DeviceFault
-    text: str
-    kind: type[DeviceError] = DeviceError
 
 
 _F = DeviceFault
@@ -94,7 +72,8 @@ STATUS: Final[dict[int, Status]] = {
     2621: _SETTING,
     2622: Status(_F.PARAMETER, "the waveform is too long for the memory of the board"),
 }
-_TOO_FAST: Final = (2608, 2942)
+_TOO_FAST: Final = Beyond(TOO_FAST, "Hz")
+_TABLE: Final = ErrorTable(STATUS, {2608: _TOO_FAST, 2942: _TOO_FAST})
 
 
 def board_error(exc: Any, call: str, board: str, *, lost: int | None = None) -> CosmicError:
@@ -112,18 +91,6 @@ def board_error(exc: Any, call: str, board: str, *, lost: int | None = None) -> 
         How many samples of each channel were lost, where that is known.
     """
     code, said = exc.errorCode, str(exc.errorString).strip()
-    driver = f" (driver: {said})" if said else ""
     if code is None:
-        return DeviceError(f"{board}: {call} failed{driver}")
-    where = f"{board}: {call} answered {code}"
-    if code in _TOO_FAST:
-        text = f"{where}: the board cannot make this rate with these inputs; choose another{driver}"
-        return LimitError(refuse(Reason.LIMIT, text, axis=board, unit="Hz"))
-    known = STATUS.get(code)
-    if known is None:
-        return DeviceError(f"{where}, which CoSMic does not know{driver}", code=code)
-    if known.fault is DeviceFault.OVERRUN:
-        amount = "an unknown number of" if lost is None else lost
-        text = f"{where}: {amount} samples of each channel were lost: {known.text}{driver}"
-        return OverrunError(text, lost=lost, code=code)
-    return known.kind(f"{where}: {known.text}{driver}", fault=known.fault, code=code)
+        return DeviceError(f"{board}: {call} failed" + (f" (driver: {said})" if said else ""))
+    return _TABLE.error(code, call, board, said=said, lost=lost)

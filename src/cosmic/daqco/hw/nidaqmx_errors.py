@@ -1,6 +1,5 @@
 """NI-DAQmx's errors as CoSMic exceptions."""
 
-from dataclasses import dataclass
 from typing import Final
 
 from nidaqmx.errors import (
@@ -11,36 +10,14 @@ from nidaqmx.errors import (
     Error,
 )
 
-from cosmic.daqco.hw.interface import OverrunError
+from cosmic.daqco.hw.board_errors import TOO_FAST, Beyond, ErrorTable, Status
 from cosmic.frame.errors import (
     CosmicError,
     DeviceError,
     DeviceFault,
     DeviceTimeout,
-    LimitError,
     NotConnectedError,
 )
-from cosmic.frame.verdict import Reason, refuse
-
-
-@dataclass(frozen=True, slots=True)
-class Status:
-    """What one error code of the driver means.
-
-    Attributes
-    ----------
-    fault : DeviceFault
-        The same in CoSMic's words.
-    text : str
-        What happened and what the operator can do.
-    kind : type of DeviceError
-        The exception that says it.
-    """
-
-    fault: DeviceFault
-    text: str
-    kind: type[DeviceError] = DeviceError
-
 
 _F = DeviceFault
 _GONE: Final = Status(
@@ -115,9 +92,15 @@ STATUS: Final[dict[int, Status]] = {
     ),
     -50352: Status(_F.OTHER, "the driver has no memory left; close other programs"),
 }
-_TOO_FAST: Final = (-200332, -200335, -200331, -200081)
-_OUT_OF_RANGE: Final = (-200579, -200580, -200695)
-_BEYOND_OUTPUT: Final = (-200561,)
+_TOO_FAST: Final = Beyond(TOO_FAST, "Hz")
+_OUT_OF_RANGE: Final = Beyond("the board has no such input range", "V")
+_BEYOND_OUTPUT: Final = Beyond("the value lies outside the limits of this output", "V")
+TABLE: Final = ErrorTable(
+    STATUS,
+    dict.fromkeys((-200332, -200335, -200331, -200081), _TOO_FAST)
+    | dict.fromkeys((-200579, -200580, -200695), _OUT_OF_RANGE)
+    | {-200561: _BEYOND_OUTPUT},
+)
 
 
 def driver_missing() -> NotConnectedError:
@@ -156,42 +139,8 @@ def board_error(exc: Error, call: str, board: str, *, lost: int | None = None) -
             fault=DeviceFault.UNSUPPORTED,
         )
     if isinstance(exc, DaqError):
-        return status_error(exc.error_code, call, board, said=_first(exc), lost=lost)
+        return TABLE.error(exc.error_code, call, board, said=_first(exc), lost=lost)
     return DeviceError(f"{board}: {call} failed: {_first(exc)}")
-
-
-def status_error(
-    code: int, call: str, board: str, *, said: str = "", lost: int | None = None
-) -> CosmicError:
-    """Return the exception for the driver's error `code`, also for an unknown one.
-
-    Parameters
-    ----------
-    said : str
-        The driver's own words.
-    lost : int or None
-        How many samples of each channel were lost, where that is known.
-    """
-    driver = f" (driver: {said})" if said else ""
-    where = f"{board}: {call} answered {code}"
-    if code in _TOO_FAST:
-        text = f"{where}: the board cannot make this rate with these inputs; choose another{driver}"
-        return LimitError(refuse(Reason.LIMIT, text, axis=board, unit="Hz"))
-    if code in _OUT_OF_RANGE:
-        text = f"{where}: the board has no such input range{driver}"
-        return LimitError(refuse(Reason.LIMIT, text, axis=board, unit="V"))
-    if code in _BEYOND_OUTPUT:
-        text = f"{where}: the value lies outside the limits of this output{driver}"
-        return LimitError(refuse(Reason.LIMIT, text, axis=board, unit="V"))
-    known = STATUS.get(code)
-    if known is None:
-        return DeviceError(f"{where}, which CoSMic does not know{driver}", code=code)
-    text = known.text
-    if known.fault is DeviceFault.OVERRUN:
-        amount = "an unknown number of" if lost is None else lost
-        text = f"{amount} samples of each channel were lost: {text}"
-        return OverrunError(f"{where}: {text}{driver}", lost=lost, code=code)
-    return known.kind(f"{where}: {text}{driver}", fault=known.fault, code=code)
 
 
 def _first(exc: Exception) -> str:

@@ -12,7 +12,7 @@ from nidaqmx.constants import AcquisitionType, TaskMode, TerminalConfiguration, 
 from nidaqmx.errors import DaqError, Error
 
 from cosmic.daqco.hw.interface import InputMode, InputSettings, OverrunError, Volts
-from cosmic.daqco.hw.nidaqmx_errors import board_error, status_error
+from cosmic.daqco.hw.nidaqmx_errors import TABLE, board_error
 from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout
 
 logger = logging.getLogger(__name__)
@@ -197,7 +197,7 @@ class InputTask:
         """Return what `exc`, put in by a callback, means."""
         board = self._settings.board
         if isinstance(exc, _EndedWithError):
-            return status_error(exc.code, "acquire", board, lost=self._lost(exc.code, run))
+            return TABLE.error(exc.code, "acquire", board, lost=self._lost(exc.code, run))
         if isinstance(exc, DaqError):
             return board_error(exc, "read", board, lost=self._lost(exc.error_code, run))
         return board_error(exc, "read", board) if isinstance(exc, Error) else exc

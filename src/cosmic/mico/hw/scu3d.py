@@ -13,6 +13,7 @@ from cosmic.frame.plugins import NoOptions
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.hw import scu3d_convert as convert
 from cosmic.mico.hw import scu3d_ctypes as sa
+from cosmic.mico.hw.addresses import no_channel
 from cosmic.mico.hw.interface import (
     Capabilities,
     Channel,
@@ -24,7 +25,7 @@ from cosmic.mico.hw.interface import (
     Event,
     Serial,
 )
-from cosmic.mico.hw.scu3d_errors import nothing_found, place, require_serials, status_error
+from cosmic.mico.hw.scu3d_errors import nothing_found, require_serials, status_error
 from cosmic.mico.hw.scu3d_events import event_from_packet
 from cosmic.mico.hw.scu3d_load import load_library
 
@@ -237,12 +238,7 @@ class Scu3dController(Controller):
     def _send(self, at: Channel, call: str, *args: int) -> None:
         # ctypes wraps what does not fit 32 bit: 2**32 + 1 would command channel 1.
         if not (0 <= at.device <= _INDEX_MAX and 0 <= at.channel <= _INDEX_MAX):
-            raise DeviceError(
-                f"{place(at.device, at.channel)}: {call}: there is no such channel",
-                fault=DeviceFault.NO_CHANNEL,
-                device=at.device,
-                channel=at.channel,
-            )
+            raise no_channel(at, call)
         status = self._library.call(call, at.device, at.channel, *args)
         # The log comes after the call, so that it never delays a stop.
         if logger.isEnabledFor(logging.DEBUG):

@@ -15,10 +15,10 @@ import operator
 from collections.abc import Sequence
 from typing import Final, SupportsIndex, cast
 
-from cosmic.frame.errors import DeviceError
 from cosmic.frame.units import AxisUnit
+from cosmic.mico.hw.addresses import refused
 from cosmic.mico.hw.interface import Channel, Serial
-from cosmic.mico.hw.scu3d_errors import refused
+from cosmic.mico.hw.scu3d_errors import LIBRARY
 
 COUNTS_PER_UM: Final = 10
 COUNTS_PER_DEG: Final = 10_000
@@ -48,7 +48,7 @@ def position_counts(value: float, unit: AxisUnit, at: Channel | None = None) -> 
     if not -most - 0.5 < counts < most + 0.5:
         limit = position_from_counts(most, unit)
         text = f"a target or distance must lie within {limit} {unit}, got {value!r} {unit}"
-        raise _refused(text, at)
+        raise refused(text, at)
     return round(counts)
 
 
@@ -76,7 +76,7 @@ def decivolts(amplitude_v: float, at: Channel | None = None) -> int:
         Outside that range or not a number.
     """
     if not MIN_DECIVOLTS / 10 <= amplitude_v <= MAX_DECIVOLTS / 10:
-        raise _refused(f"amplitude must be 15 to 100 V, got {amplitude_v!r} V", at)
+        raise refused(f"amplitude must be 15 to 100 V, got {amplitude_v!r} V", at)
     return round(amplitude_v * 10)
 
 
@@ -91,7 +91,9 @@ def hold_ms(hold_s: float, at: Channel | None = None) -> int:
     if hold_s == math.inf:
         return HOLD_FOR_EVER_MS
     if not 0.0 <= hold_s <= (HOLD_FOR_EVER_MS - 1) / 1000:
-        raise _refused(f"hold time must be 0 to 59.999 s or inf for ever, got {hold_s!r} s", at)
+        raise refused(
+            f"hold time must be 0 to 59.999 s or inf for ever, got {hold_s!r} s", at, none=LIBRARY
+        )
     return round(hold_s * 1000)
 
 
@@ -104,7 +106,9 @@ def timeout_ms(timeout_s: float) -> int:
         Negative, not a number or endless; the library cannot cancel a wait.
     """
     if not 0.0 <= timeout_s <= _INT32_MAX / 1000:
-        raise _refused(f"a wait must be finite and not negative, got {timeout_s!r} s", None)
+        raise refused(
+            f"a wait must be finite and not negative, got {timeout_s!r} s", None, none=LIBRARY
+        )
     return math.ceil(timeout_s * 1000)
 
 
@@ -155,13 +159,7 @@ def _whole(value: SupportsIndex | str, low: int, high: int, what: str, at: Chann
     try:
         number = operator.index(cast("SupportsIndex", value))
     except TypeError:
-        raise _refused(f"{what} must be a whole number, got {value!r}", at) from None
+        raise refused(f"{what} must be a whole number, got {value!r}", at) from None
     if not low <= number <= high:
-        raise _refused(f"{what} must be {low} to {high}, got {number}", at)
+        raise refused(f"{what} must be {low} to {high}, got {number}", at)
     return number
-
-
-def _refused(text: str, at: Channel | None) -> DeviceError:
-    if at is None:
-        return refused(text)
-    return refused(text, device=at.device, channel=at.channel)

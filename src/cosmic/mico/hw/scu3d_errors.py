@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout, NotConnectedError
+from cosmic.mico.hw.addresses import where
 from cosmic.mico.hw.interface import Serial
 from cosmic.mico.hw.scu3d_ctypes import SA_DEVICE_NOT_FOUND_ERROR, SA_NO_DEVICES_FOUND_ERROR
 
@@ -108,12 +109,7 @@ STATUS: Final[dict[int, Status]] = {
 }
 
 
-def place(device: int | None, channel: int | None = None, *, serial: Serial | None = None) -> str:
-    """Return where something happened, such as "device 1 (serial 4711), channel 2"."""
-    if device is None:
-        return "SCU3DControl"
-    text = f"device {device}" if serial is None else f"device {device} (serial {serial})"
-    return text if channel is None else f"{text}, channel {channel}"
+LIBRARY: Final = "SCU3DControl"
 
 
 def status_error(
@@ -137,21 +133,13 @@ def status_error(
     serial : int or None
         What is printed on that device.
     """
-    where = place(device, channel, serial=serial)
+    at = where(device, channel, serial=serial, none=LIBRARY)
     known = STATUS.get(code)
     if known is None:
-        text = f"{where}: {call} answered with the unknown status {code}"
+        text = f"{at}: {call} answered with the unknown status {code}"
         return DeviceError(text, code=code, device=device, channel=channel)
-    text = f"{where}: {call} answered {code} (SA_{known.name}): {known.text}"
+    text = f"{at}: {call} answered {code} (SA_{known.name}): {known.text}"
     return known.kind(text, fault=known.fault, code=code, device=device, channel=channel)
-
-
-def refused(text: str, *, device: int | None = None, channel: int | None = None) -> DeviceError:
-    """Return the exception for a value that is refused before the library sees it."""
-    where = place(device, channel)
-    return DeviceError(
-        f"{where}: {text}", fault=DeviceFault.PARAMETER, device=device, channel=channel
-    )
 
 
 def nothing_found(call: str) -> DeviceError:
@@ -165,7 +153,7 @@ def require_serials(wanted: Sequence[Serial], found: Sequence[Serial]) -> None:
     missing = [serial for serial in wanted if serial not in found]
     if missing:
         raise NotConnectedError(
-            f"{place(None)}: no device with serial number {', '.join(map(str, missing))}; "
+            f"{LIBRARY}: no device with serial number {', '.join(map(str, missing))}; "
             f"connected: {', '.join(map(str, found)) or 'none'}",
             fault=DeviceFault.COMMUNICATION,
             code=SA_DEVICE_NOT_FOUND_ERROR,

@@ -13,6 +13,7 @@ from cosmic.frame.config import StrictModel
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.hw import scu_serial_text as text
+from cosmic.mico.hw.addresses import device_of, open_device, refused
 from cosmic.mico.hw.interface import (
     Capabilities,
     Channel,
@@ -27,6 +28,8 @@ from cosmic.mico.hw.interface import (
 from cosmic.mico.hw.scu_serial_unit import CHANNELS, SerialLike, Unit
 
 logger = logging.getLogger(__name__)
+
+_NOT_OPEN: Final = "the serial lines are not open"
 
 READ_S: Final = 0.02
 """How long one look at the port waits for a byte."""
@@ -199,7 +202,9 @@ class ScuSerialController(Controller):
     def receive(self, device: int, timeout_s: float) -> Event | None:
         unit = self._unit(device)
         if not 0.0 <= timeout_s <= _LONGEST_WAIT_S:
-            raise text.refused(f"a wait must be finite and not negative, got {timeout_s!r} s")
+            raise refused(
+                f"a wait must be finite and not negative, got {timeout_s!r} s", none="SCU"
+            )
         event = unit.receive(timeout_s)
         if event is not None and logger.isEnabledFor(logging.DEBUG):
             logger.debug("device %d: %s", device, event)
@@ -282,29 +287,10 @@ class ScuSerialController(Controller):
     # Where
 
     def _unit(self, device: int) -> Unit:
-        units = self._units
-        if not units:
-            said = f"{text.place(device)}: the serial lines are not open"
-            raise DeviceError(said, fault=DeviceFault.STATE, device=device)
-        if not 0 <= device < len(units):
-            said = f"{text.place(device)}: there is no such device"
-            raise DeviceError(said, fault=DeviceFault.NO_CHANNEL, device=device)
-        return units[device]
+        return open_device(self._units, device, _NOT_OPEN)
 
     def _at(self, channel: Channel) -> Unit:
-        units = self._units
-        if units and 0 <= channel.device < len(units):
-            unit = units[channel.device]
-            if 0 <= channel.channel < unit.channels:
-                return unit
-        elif not units:
-            return self._unit(channel.device)
-        raise DeviceError(
-            f"{text.place(channel.device, channel.channel)}: there is no such channel",
-            fault=DeviceFault.NO_CHANNEL,
-            device=channel.device,
-            channel=channel.channel,
-        )
+        return device_of(self._units, channel, lambda unit: unit.channels, _NOT_OPEN)
 
 
 def _exactly(wanted: str) -> Callable[[str], str | None]:

@@ -13,6 +13,7 @@ from typing import Final
 
 from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout
 from cosmic.frame.units import AxisUnit
+from cosmic.mico.hw.addresses import refused, where
 from cosmic.mico.hw.interface import (
     Activity,
     ActivityRead,
@@ -74,28 +75,14 @@ _LETTERS: Final[dict[str, Activity]] = {
 _NUMBER: Final = r"(-?\d+(?:\.\d+)?)"
 
 
-def place(device: int | None, channel: int | None = None, *, serial: Serial | None = None) -> str:
-    """Return where something happened, such as "device 1 (serial 4711), channel 2"."""
-    text = "SCU" if device is None else f"device {device}"
-    text += "" if serial is None else f" (serial {serial})"
-    return text if channel is None else f"{text}, channel {channel}"
-
-
 def code_error(code: int, asked: str, at: Channel, *, serial: Serial | None = None) -> DeviceError:
     """Return the exception for an error code, also for one that nobody documented."""
     channel = None if at.channel == WHOLE_UNIT else at.channel
-    where = place(at.device, channel, serial=serial)
+    here = where(at.device, channel, serial=serial)
     fault, text = ERRORS.get(code, (DeviceFault.OTHER, "an error that is not documented"))
     kind = DeviceTimeout if fault is DeviceFault.TIMEOUT else DeviceError
-    said = f"{where}: {asked} was answered with error {code}: {text}"
+    said = f"{here}: {asked} was answered with error {code}: {text}"
     return kind(said, fault=fault, code=code, device=at.device, channel=channel)
-
-
-def refused(text: str, at: Channel | None = None) -> DeviceError:
-    """Return the exception for a value that is refused before anything is sent."""
-    device, channel = (None, None) if at is None else (at.device, at.channel)
-    said = f"{place(device, channel)}: {text}"
-    return DeviceError(said, fault=DeviceFault.PARAMETER, device=device, channel=channel)
 
 
 # Out

@@ -17,6 +17,7 @@ from typing import Final, Protocol
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, DeviceTimeout
 from cosmic.mico.hw import scu_serial_text as text
+from cosmic.mico.hw.addresses import where
 from cosmic.mico.hw.interface import Channel, Event, Failed, OtherAnswer, Serial
 
 logger = logging.getLogger(__name__)
@@ -193,8 +194,8 @@ class Unit:
                 self._known.pop(key, None)
 
     def _lose(self, exc: OSError) -> None:
-        where = text.place(self.index, serial=self.serial)
-        said = f"{where}: the line {self.name} is lost ({exc}); check cable and power, then rescan"
+        here = where(self.index, serial=self.serial)
+        said = f"{here}: the line {self.name} is lost ({exc}); check cable and power, then rescan"
         fault = DeviceFault.COMMUNICATION
         self._gone = self._gone or DeviceError(said, fault=fault, device=self.index)
 
@@ -309,8 +310,8 @@ class Unit:
             return
         self._under_way.popleft()
         self._missed += 1
-        where = text.place(self.index, line.at.channel, serial=self.serial)
-        said = f"{where}: {line.said} was not answered within {self.answer_s:g} s"
+        here = where(self.index, line.at.channel, serial=self.serial)
+        said = f"{here}: {line.said} was not answered within {self.answer_s:g} s"
         logger.warning("%s", said)
         error = DeviceTimeout(
             said, fault=DeviceFault.TIMEOUT, device=self.index, channel=line.at.channel

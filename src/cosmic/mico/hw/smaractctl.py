@@ -16,6 +16,7 @@ from cosmic.frame.units import AxisUnit
 from cosmic.mico.hw import smaractctl_convert as convert
 from cosmic.mico.hw import smaractctl_ctypes as sa
 from cosmic.mico.hw import smaractctl_events as events
+from cosmic.mico.hw.addresses import device_of, open_device
 from cosmic.mico.hw.interface import (
     Activity,
     ActivityRead,
@@ -32,10 +33,12 @@ from cosmic.mico.hw.interface import (
     MatchedMove,
     Serial,
 )
-from cosmic.mico.hw.smaractctl_errors import place, result_error
+from cosmic.mico.hw.smaractctl_errors import LIBRARY, result_error
 from cosmic.mico.hw.smaractctl_load import load_library
 
 logger = logging.getLogger(__name__)
+
+_NOT_OPEN: Final = "SmarActCTL is not open"
 
 MOST_CHANNELS: Final = 18
 IDLE_MAY_LIE_S: Final = 0.5
@@ -160,7 +163,7 @@ class SmaractCtlController(Controller):
             missing = [str(serial) for serial in serials if serial not in found]
             if missing or not found:
                 raise NotConnectedError(
-                    f"{place(None)}: no device {', '.join(missing)}; "
+                    f"{LIBRARY}: no device {', '.join(missing)}; "
                     f"connected: {', '.join(found) or 'none'}; check power and cable",
                     fault=DeviceFault.COMMUNICATION,
                     code=sa.SA_CTL_ERROR_DEVICE_NOT_FOUND,
@@ -527,30 +530,11 @@ class SmaractCtlController(Controller):
     # Where
 
     def _device(self, index: int) -> _Device:
-        devices = self._devices
-        if not devices:
-            text = f"{place(index)}: SmarActCTL is not open"
-            raise DeviceError(text, fault=DeviceFault.STATE, device=index)
-        if not 0 <= index < len(devices):
-            text = f"{place(index)}: there is no such device"
-            raise DeviceError(text, fault=DeviceFault.NO_CHANNEL, device=index)
-        return devices[index]
+        return open_device(self._devices, index, _NOT_OPEN)
 
     def _at(self, channel: Channel, call: str) -> _Device:
         """Return the device of a channel; ctypes would wrap an index that does not fit 8 bit."""
-        devices = self._devices
-        if devices and 0 <= channel.device < len(devices):
-            device = devices[channel.device]
-            if 0 <= channel.channel < device.channels:
-                return device
-        elif not devices:
-            self._device(channel.device)
-        raise DeviceError(
-            f"{place(channel.device, channel.channel)}: {call}: there is no such channel",
-            fault=DeviceFault.NO_CHANNEL,
-            device=channel.device,
-            channel=channel.channel,
-        )
+        return device_of(self._devices, channel, lambda device: device.channels, _NOT_OPEN, call)
 
     def _checked(
         self, code: int, call: str, *, device: int | None = None, at: Channel | None = None

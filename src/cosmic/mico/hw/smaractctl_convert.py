@@ -8,10 +8,10 @@ import math
 import operator
 from typing import Final
 
-from cosmic.frame.errors import DeviceError
 from cosmic.frame.units import AxisUnit
+from cosmic.mico.hw.addresses import refused
 from cosmic.mico.hw.interface import Channel
-from cosmic.mico.hw.smaractctl_errors import refused
+from cosmic.mico.hw.smaractctl_errors import LIBRARY
 
 COUNTS: Final[dict[AxisUnit, int]] = {"um": 1_000_000, "deg": 1_000_000_000}
 MOST_COUNTS: Final = 10**14
@@ -58,7 +58,9 @@ def amplitude(amplitude_v: float, at: Channel | None = None) -> int:
     """Return an amplitude of 1 to 100 V as a part of 65535."""
     low, high = AMPLITUDE_V
     if not low <= amplitude_v <= high:
-        raise _refused(f"amplitude must be {low:g} to {high:g} V, got {amplitude_v!r} V", at)
+        raise refused(
+            f"amplitude must be {low:g} to {high:g} V, got {amplitude_v!r} V", at, none=LIBRARY
+        )
     return round(amplitude_v / high * FULL_AMPLITUDE)
 
 
@@ -77,28 +79,32 @@ def hold_ms(hold_s: float, at: Channel | None = None) -> int:
     if hold_s == math.inf:
         return HOLD_FOR_EVER_MS
     if not 0.0 <= hold_s <= _INT32_MAX / 1000:
-        raise _refused(f"hold time must not be negative, or inf for ever, got {hold_s!r} s", at)
+        raise refused(
+            f"hold time must not be negative, or inf for ever, got {hold_s!r} s", at, none=LIBRARY
+        )
     return round(hold_s * 1000)
 
 
 def timeout_ms(timeout_s: float) -> int:
     """Return a waiting time in ms, rounded up so that a short wait is not a busy loop."""
     if not 0.0 <= timeout_s <= _INT32_MAX / 1000:
-        raise _refused(f"a wait must be finite and not negative, got {timeout_s!r} s", None)
+        raise refused(
+            f"a wait must be finite and not negative, got {timeout_s!r} s", None, none=LIBRARY
+        )
     return math.ceil(timeout_s * 1000)
 
 
 def _scaled(value: float, factor: int, most: int, what: str, at: Channel | None) -> int:
     if not -most / factor <= value <= most / factor:
         limit = most / factor
-        raise _refused(f"{what} must lie within {limit:g}, got {value!r}", at)
+        raise refused(f"{what} must lie within {limit:g}, got {value!r}", at)
     return round(value * factor)
 
 
 def _above_zero(number: int, value: float, what: str, at: Channel | None) -> int:
     # 0 means "not controlled", which is another way to move.
     if not number > 0:
-        raise _refused(f"{what} must be above 0, got {value!r}", at)
+        raise refused(f"{what} must be above 0, got {value!r}", at)
     return number
 
 
@@ -106,13 +112,7 @@ def _whole(value: int, low: int, high: int, what: str, at: Channel | None) -> in
     try:
         number = operator.index(value)
     except TypeError:
-        raise _refused(f"{what} must be a whole number, got {value!r}", at) from None
+        raise refused(f"{what} must be a whole number, got {value!r}", at) from None
     if not low <= number <= high:
-        raise _refused(f"{what} must be {low} to {high}, got {number}", at)
+        raise refused(f"{what} must be {low} to {high}, got {number}", at)
     return number
-
-
-def _refused(text: str, at: Channel | None) -> DeviceError:
-    if at is None:
-        return refused(text)
-    return refused(text, device=at.device, channel=at.channel)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout, NotConnectedError
+from cosmic.mico.hw.addresses import where
 from cosmic.mico.hw.interface import Serial
 
 _F = DeviceFault
@@ -95,12 +96,7 @@ RESULTS: Final[dict[int, Result]] = {
 }
 
 
-def place(device: int | None, channel: int | None = None, *, serial: Serial | None = None) -> str:
-    """Return where something happened, such as "device 1 (MCS2-00000412), channel 2"."""
-    if device is None:
-        return "SmarActCTL"
-    text = f"device {device}" if serial is None else f"device {device} ({serial})"
-    return text if channel is None else f"{text}, channel {channel}"
+LIBRARY: Final = "SmarActCTL"
 
 
 def result_error(
@@ -120,18 +116,10 @@ def result_error(
     device, channel : int or None
         Where, both counted from zero.
     """
-    where = place(device, channel, serial=serial)
+    at = where(device, channel, serial=serial, none=LIBRARY)
     known = RESULTS.get(code)
     if known is None:
-        text = f"{where}: {call} answered with the unknown result {code:#06x}"
+        text = f"{at}: {call} answered with the unknown result {code:#06x}"
         return DeviceError(text, code=code, device=device, channel=channel)
-    text = f"{where}: {call} answered {code:#06x} (SA_CTL_ERROR_{known.name}): {known.text}"
+    text = f"{at}: {call} answered {code:#06x} (SA_CTL_ERROR_{known.name}): {known.text}"
     return known.kind(text, fault=known.fault, code=code, device=device, channel=channel)
-
-
-def refused(text: str, *, device: int | None = None, channel: int | None = None) -> DeviceError:
-    """Return the exception for a value that is refused before the library sees it."""
-    where = place(device, channel)
-    return DeviceError(
-        f"{where}: {text}", fault=DeviceFault.PARAMETER, device=device, channel=channel
-    )

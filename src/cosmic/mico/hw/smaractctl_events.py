@@ -7,6 +7,7 @@ from typing import Final
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.hw import smaractctl_ctypes as sa
+from cosmic.mico.hw.addresses import where
 from cosmic.mico.hw.interface import (
     Activity,
     ActivityRead,
@@ -27,7 +28,7 @@ from cosmic.mico.hw.interface import (
     TypeRead,
 )
 from cosmic.mico.hw.smaractctl_convert import from_counts
-from cosmic.mico.hw.smaractctl_errors import place, result_error
+from cosmic.mico.hw.smaractctl_errors import result_error
 
 Answers = Mapping[int, int | str]
 _UNITS: Final[dict[int, tuple[AxisUnit, PositionerKind]]] = {
@@ -111,7 +112,7 @@ def position_in(wanted: AxisUnit) -> Callable[[Channel, Answers], Event]:
         base = int(answers[sa.SA_CTL_PKEY_POS_BASE_UNIT])
         unit, _ = _UNITS.get(base, (None, None))
         if unit != wanted:
-            text = f"{place(at.device, at.channel)}: its position is not in {wanted}"
+            text = f"{where(at.device, at.channel)}: its position is not in {wanted}"
             fault = DeviceFault.WRONG_KIND
             error = DeviceError(text, fault=fault, device=at.device, channel=at.channel)
             return Failed(at, error)

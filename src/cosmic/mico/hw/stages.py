@@ -23,6 +23,7 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.config import StrictModel
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
 from cosmic.frame.units import AxisUnit
+from cosmic.mico.hw.addresses import device_of, error_at, open_device, refused, where
 from cosmic.mico.hw.interface import (
     Activity,
     ActivityRead,
@@ -154,23 +155,9 @@ class StageUnit(Protocol):
         """Return what one of `errors` means."""
 
 
-def place(device: int, channel: int | None = None) -> str:
-    """Return where something happened."""
-    return f"device {device}" if channel is None else f"device {device}, channel {channel}"
-
-
-def refused(text: str, at: Channel) -> DeviceError:
-    """Return the exception for a value that is refused before the library sees it."""
-    said = f"{place(at.device, at.channel)}: {text}"
-    fault = DeviceFault.PARAMETER
-    return DeviceError(said, fault=fault, device=at.device, channel=at.channel)
-
-
 def unsupported(what: str, at: Channel) -> DeviceError:
     """Return the exception for what a stage cannot do."""
-    said = f"{place(at.device, at.channel)}: the stage knows no {what}"
-    fault = DeviceFault.UNSUPPORTED
-    return DeviceError(said, fault=fault, device=at.device, channel=at.channel)
+    return error_at(DeviceFault.UNSUPPORTED, f"the stage knows no {what}", at)
 
 
 def _within(value: float, low: float, high: float, what: str, at: Channel) -> float:
@@ -213,7 +200,7 @@ class _Open:
                 return work()
         except self.unit.errors as exc:
             fault = self.unit.fault(exc)
-            said = f"{place(self.index, axis)}: {asked}: {str(exc) or type(exc).__name__}"
+            said = f"{where(self.index, axis)}: {asked}: {str(exc) or type(exc).__name__}"
             raise DeviceError(said, fault=fault, device=self.index, channel=axis) from exc
         finally:
             self.make_stops()
@@ -229,7 +216,7 @@ class _Open:
                 while self.stops:
                     self.unit.stop(self.stops.popleft())
             except self.unit.errors as exc:
-                said = f"{place(self.index)}: a stop failed: {str(exc) or type(exc).__name__}"
+                said = f"{where(self.index)}: a stop failed: {str(exc) or type(exc).__name__}"
                 failed = DeviceError(said, fault=self.unit.fault(exc), device=self.index)
                 self.events.append(Failed(None, failed))
             finally:
@@ -450,7 +437,7 @@ class StageController(Controller):
                 "reading its position", channel.channel, lambda: at.unit.position(channel.channel)
             )
             if not math.isfinite(counted):
-                text = f"{place(channel.device, channel.channel)}: its position is {counted!r}"
+                text = f"{where(channel.device, channel.channel)}: its position is {counted!r}"
                 raise DeviceError(text, device=channel.device, channel=channel.channel)
             return PositionRead(channel, counted / axis.counts, unit)
 
@@ -463,13 +450,13 @@ class StageController(Controller):
 
     def _check_kind(self, channel: Channel, unit: AxisUnit) -> None:
         axis = self._axis(channel)
-        where = place(channel.device, channel.channel)
+        here = where(channel.device, channel.channel)
         fault, why = DeviceFault.NO_SENSOR, "it has no sensor"
         if axis.kind != "open-loop":
             if axis.axis_unit == unit:
                 return
             fault, why = DeviceFault.WRONG_KIND, f"its position is not in {unit}"
-        said = f"{where}: {why}"
+        said = f"{here}: {why}"
         raise DeviceError(said, fault=fault, device=channel.device, channel=channel.channel)
 
     # Movements
@@ -562,29 +549,19 @@ class StageController(Controller):
 
     # Where
 
+    @property
+    def _not_open(self) -> str:
+        return f"{self._title} is not open"
+
     def _device(self, device: int) -> _Open:
-        devices = self._devices
-        if not devices:
-            text = f"{place(device)}: {self._title} is not open"
-            raise DeviceError(text, fault=DeviceFault.STATE, device=device)
-        if not 0 <= device < len(devices):
-            text = f"{place(device)}: there is no such device"
-            raise DeviceError(text, fault=DeviceFault.NO_CHANNEL, device=device)
-        return devices[device]
+        return open_device(self._devices, device, self._not_open)
 
     def _at(self, channel: Channel) -> _Open:
-        devices = self._devices
-        if devices and 0 <= channel.device < len(devices):
-            device = devices[channel.device]
-            if 0 <= channel.channel < len(device.unit.axes):
-                return device
-        elif not devices:
-            return self._device(channel.device)
-        raise DeviceError(
-            f"{place(channel.device, channel.channel)}: there is no such channel",
-            fault=DeviceFault.NO_CHANNEL,
-            device=channel.device,
-            channel=channel.channel,
+        return device_of(
+            self._devices,
+            channel,
+            lambda device: len(device.unit.axes),
+            f"{self._title} is not open",
         )
 
     def _axis(self, channel: Channel) -> AxisOptions:
