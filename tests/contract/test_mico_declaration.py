@@ -11,7 +11,7 @@ from cosmic.frame.declaration import Declared, declaration_of
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.operation import Operation
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.api.ways import PlannedPath
+from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.core.motion.orders import Jog, MoveBy, MoveTo
 
 TEXT = "cosmic-trajectory 1\nplatform FiberStation\nleft.x to 20 um\n"

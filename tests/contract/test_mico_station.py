@@ -43,10 +43,10 @@ from cosmic.frame.verdict import Reason
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.client import MicoClient
 from cosmic.mico.api.mico import Mico, mico_of
+from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.api.stepwise import StepwiseMove
-from cosmic.mico.api.trajectory_places import AwayFromStartError
+from cosmic.mico.api.trajectory_start import AwayFromStartError
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
-from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.motion.orders import Jog, MoveTo, Steer
 from cosmic.mico.core.motion.positioner import Confidence, Status
 from cosmic.mico.core.motion.stop_latch import StopState

@@ -51,9 +51,7 @@ KEPT = {
     "daqco/core/unclosed_file.py": {"tell"},  # the protocol of Python's files
     "autonomy/campaign/recipe.py": {"two hands"},  # a name that old recipes have
     "frame/declaration.py": {"elsewhere"},  # old names, which warn
-    "mico/api/mico.py": {"judge"},  # `Mico.judge` is part of the scripted API
-    "autonomy/control/sink.py": {"judge"},
-    "mico/api/tools.py": {"judge"},
+    "mico/api/mico.py": {"judge"},  # an old name, which warns
 }
 _ANY = re.compile("|".join([*INSTEAD, *PHRASES]), re.IGNORECASE)
 _PARTS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")

@@ -72,15 +72,15 @@ from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.move_status import MoveStatus
+from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.api.poses import Poses
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.api.tools import Tool
 from cosmic.mico.api.trajectories import Trajectories
-from cosmic.mico.api.trajectory_places import AwayFromStartError
 from cosmic.mico.api.trajectory_player import TrajectoryPlayer
 from cosmic.mico.api.trajectory_recording import TrajectoryRecording
+from cosmic.mico.api.trajectory_start import AwayFromStartError
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
-from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.motion.links import Link
 from cosmic.mico.core.motion.movement import Movement

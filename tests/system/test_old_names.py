@@ -11,7 +11,7 @@ IN_MODULES = {
     "cosmic.vico.core.recording.reading": ("open_picture_recording", "open_image_recording"),
     "cosmic.vico.core.recording.export": ("export_pictures", "export_images"),
     "cosmic.vico.core.recording.snap": ("save_picture", "save_image"),
-    "cosmic.mico.api.ways": ("Way", "PlannedPath"),
+    "cosmic.mico.api.planned_path": ("Way", "PlannedPath"),
 }
 OLD = [
     (title, name)
@@ -37,6 +37,13 @@ def test_the_old_names_of_a_camera_are_kept() -> None:
 def test_the_old_names_of_the_axes_are_kept() -> None:
     kept = {name for title, name in OLD if title in ("Mico", "Declared")}
     assert {"find_way", "elsewhere", "moves_elsewhere"} <= kept
+
+
+def test_an_old_module_leads_to_the_new_one() -> None:
+    old = importlib.import_module("cosmic.mico.api.ways")
+    new = importlib.import_module("cosmic.mico.api.planned_path")
+    with pytest.warns(DeprecationWarning, match="planned_path"):
+        assert old.PlannedPath is new.PlannedPath
 
 
 @pytest.mark.parametrize(("module", "names"), IN_MODULES.items())

@@ -12,8 +12,8 @@ import pytest
 
 from cosmic.frame.clock import WALL
 from cosmic.mico.api.mico import Mico
+from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.api.stepwise import StepwiseMove
-from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.trajectory.parser import parse
 from cosmic.mico.hw.sdl_virtual import VirtualGamepad
 from cosmic.twin.scene import Scene

@@ -29,8 +29,8 @@ from cosmic.frame.errors import (
 )
 from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.api.trajectory_places import AwayFromStartError
 from cosmic.mico.api.trajectory_recording import TrajectoryRecording
+from cosmic.mico.api.trajectory_start import AwayFromStartError
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
 from cosmic.mico.core.motion.messages import MovementBegun
 from cosmic.mico.core.trajectory.model import Trajectory, TrajectoryError

@@ -13,7 +13,7 @@ from cosmic.app.configuration.platform_file import load_platform
 from cosmic.app.panels.path_preview import PathPreview, PreviewState, path_text, poses_along
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.frame.config import shipped_config_dir
-from cosmic.mico.api.ways import PlannedPath
+from cosmic.mico.api.planned_path import PlannedPath
 from gui.app.windows import Make, card, mico, scene
 from gui.mico.panels import click, enter, field, part, position, wait_for_position
 

@@ -21,7 +21,7 @@ from cosmic.frame.gui.theme import STEP_PX, State, ui_font
 from cosmic.frame.operation import Progress, Task
 from cosmic.frame.overrides import override
 from cosmic.frame.verdict import MoveVerdict
-from cosmic.mico.api.ways import PlannedPath
+from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.gui.detour_request import DetourRequest
 from cosmic.mico.gui.mico_widget import MicoWidget
 
@@ -221,8 +221,8 @@ class PathController(QObject):
         # Queued even from this thread: the answer was sent before, and comes before its end.
         queued = Qt.ConnectionType.QueuedConnection
         self._relay = Relay(self._on_progressed, queued=True)
-        self._application.way_found.connect(self._on_answer, queued)
-        self._application.way_missing.connect(self._on_answer, queued)
+        self._application.path_found.connect(self._on_answer, queued)
+        self._application.path_missing.connect(self._on_answer, queued)
         panel.detour_wanted.connect(self.plan)
         scene.refused_gone.connect(self._on_refused_gone)
         preview.go_requested.connect(self.go)
@@ -241,7 +241,7 @@ class PathController(QObject):
             self._refuse(request, f"{request.axis} is moving; wait until it is stationary")
             return
         try:
-            task = self._application.search_way({request.axis: request.target})
+            task = self._application.search_path({request.axis: request.target})
         except NotAvailable as exc:
             self._refuse(request, str(exc))
             return
@@ -311,7 +311,7 @@ class PathController(QObject):
             self.plan(request)
             return
         try:
-            task = self._application.follow_way(path, self._mico.source)
+            task = self._application.follow_path(path, self._mico.source)
         except NotAvailable as exc:
             self._preview.set_words(f"Not yet: {exc}. Then press Go again.")
             return

@@ -103,7 +103,7 @@ class AxisSink:
             raise NotAvailable(f"{self.name} is moving; wait until it is stationary")
         if state.position is None:
             raise NotAvailable(f"{self.name}: no position has been read yet")
-        verdict = self._mico.judge({self.name: MoveTo(state.position, state.unit)})
+        verdict = self._mico.verdict_on({self.name: MoveTo(state.position, state.unit)})
         if not verdict.allowed:
             raise refusal(verdict)
         self._home = self._target = self._wanted = state.position

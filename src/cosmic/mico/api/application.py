@@ -14,9 +14,9 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Operation, Task
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.initialisation import Asker, Confirm, InitialisationRun
+from cosmic.mico.api.planned_path import PlannedPath, follow, path_from_plan
 from cosmic.mico.api.trajectory_player import Players
 from cosmic.mico.api.trajectory_site import TrajectorySite
-from cosmic.mico.api.ways import PlannedPath, follow, way_from_plan
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.collision_manager import CollisionManager
@@ -188,22 +188,22 @@ class MicoApplication(MicoApplicationBase):
         """Answer the question that the sequence asks."""
         self._asker.answer(agreed)
 
-    # Ways round (ECM)
+    # Detours, in mode ECM
 
     @override
-    def find_way(self, targets: Mapping[str, float], budget_s: float) -> PlannedPath:
-        """Return a way of some axes to `targets`, in gate coordinates; waits for it.
+    def plan_path(self, targets: Mapping[str, float], budget_s: float) -> PlannedPath:
+        """Return a path of some axes to `targets`, in gate coordinates; waits for it.
 
         Raises
         ------
         NotAvailable
             There is no collision model.
         MoveRefused
-            No way was found; the verdict says what blocks.
+            No path was found; the verdict says what blocks.
         """
         if self.path_planner is None:
-            raise NotAvailable(f"{NO_MODEL_TEXT}: without one there is nothing to go round")
-        return way_from_plan(self.path_planner.plan_path(targets, budget_s))
+            raise NotAvailable(f"{NO_MODEL_TEXT}: without one no path can be planned")
+        return path_from_plan(self.path_planner.plan_path(targets, budget_s))
 
     def begin_search(self, targets: Mapping[str, float], budget_s: float) -> Operation[PlannedPath]:
         """Begin to look for a path in the application's thread; raises `NotAvailable`."""
@@ -211,12 +211,12 @@ class MicoApplication(MicoApplicationBase):
 
         def search(task: Task) -> None:
             try:
-                way = self.find_way(targets, budget_s)
+                path = self.plan_path(targets, budget_s)
             except CosmicError as exc:
                 found.fail(exc)
                 task.fail(exc)
             else:
-                found.finish(way)
+                found.finish(path)
                 task.finish()
 
         task = self.begin(found.title, search)
@@ -225,8 +225,8 @@ class MicoApplication(MicoApplicationBase):
         return found
 
     @override
-    def follow_way(self, way: PlannedPath, source: str) -> Task:
-        return self.begin("Going round", lambda task: follow(self.manager, way, task, source))
+    def follow_path(self, path: PlannedPath, source: str) -> Task:
+        return self.begin("Following a path", lambda task: follow(self.manager, path, task, source))
 
     def _rescan(self, task: Task) -> None:
         task.report(0.1, "closing and opening the library")

@@ -14,16 +14,16 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Task
 from cosmic.frame.task_application import TaskApplication
 from cosmic.mico.api.initialisation import Confirm
+from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.api.trajectory_recording import Recordings
-from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.motion.undo import Cautions
 from cosmic.mico.core.sequence.report import SequenceReport
 from cosmic.mico.core.teleoperation.teleoperation import SteeredPlatform, Teleoperation
 
-WAY_BUDGET_S: Final = 1.0
-"""How long a way is looked for, in wall time."""
+PATH_BUDGET_S: Final = 1.0
+"""How long a path is looked for, in wall time."""
 
 
 class MicoApplicationBase(TaskApplication):
@@ -31,8 +31,8 @@ class MicoApplicationBase(TaskApplication):
 
     Signals
     -------
-    way_found(Way), way_missing(MoveVerdict)
-        How `search_way` ended.
+    path_found(Way), path_missing(MoveVerdict)
+        How `search_path` ended.
     initialisation_changed(SequenceReport)
         The initialisation sequence is further; in the application's thread.
     status_changed()
@@ -40,8 +40,8 @@ class MicoApplicationBase(TaskApplication):
     """
 
     rescanned = Signal()
-    way_found = Signal(object)
-    way_missing = Signal(object)
+    path_found = Signal(object)
+    path_missing = Signal(object)
     initialisation_changed = Signal(object)
 
     clearance_watch: ClearanceWatch | None
@@ -107,15 +107,15 @@ class MicoApplicationBase(TaskApplication):
         """
 
     @abstractmethod
-    def find_way(self, targets: Mapping[str, float], budget_s: float) -> PlannedPath:
-        """Return a way of some axes to `targets`, in gate coordinates; waits for it.
+    def plan_path(self, targets: Mapping[str, float], budget_s: float) -> PlannedPath:
+        """Return a path of some axes to `targets`, in gate coordinates; waits for it.
 
         Raises
         ------
         NotAvailable
             There is no collision model.
         MoveRefused
-            No way was found; the verdict says what blocks.
+            No path was found; the verdict says what blocks.
         """
 
     @abstractmethod
@@ -139,8 +139,8 @@ class MicoApplicationBase(TaskApplication):
         """
 
     @abstractmethod
-    def follow_way(self, way: PlannedPath, source: str) -> Task:
-        """Go a way that was found; returns at once.
+    def follow_path(self, path: PlannedPath, source: str) -> Task:
+        """Follow a path that was found; returns at once.
 
         Raises
         ------
@@ -153,19 +153,19 @@ class MicoApplicationBase(TaskApplication):
     def initialisation(self) -> SequenceReport:
         """How far the initialisation sequence is, or was."""
 
-    def search_way(self, targets: Mapping[str, float], budget_s: float = WAY_BUDGET_S) -> Task:
-        """Look for a way in the application's thread; `way_found` or `way_missing` tells."""
+    def search_path(self, targets: Mapping[str, float], budget_s: float = PATH_BUDGET_S) -> Task:
+        """Plan a path in the application's thread; `path_found` or `path_missing` tells."""
 
         def search(task: Task) -> None:
             try:
-                way = self.find_way(targets, budget_s)
+                path = self.plan_path(targets, budget_s)
             except MoveRefused as exc:
-                self.way_missing.emit(exc.verdict)
+                self.path_missing.emit(exc.verdict)
                 task.fail(exc)
             except CosmicError as exc:
                 task.fail(exc)
             else:
-                self.way_found.emit(way)
+                self.path_found.emit(path)
                 task.finish()
 
-        return self.begin("Looking for a way", search)
+        return self.begin("Planning a path", search)

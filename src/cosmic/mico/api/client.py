@@ -19,7 +19,7 @@ from cosmic.frame.threads import may_wait_here
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.initialisation import POLL_S, Confirm
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.api.ways import PlannedPath
+from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.motion.undo import Cautions
@@ -172,12 +172,14 @@ class MicoClient(MicoApplicationBase):
         return self._begin_there("Looking for devices", self.api.begin_rescan)
 
     @override
-    def find_way(self, targets: Mapping[str, float], budget_s: float) -> PlannedPath:
+    def plan_path(self, targets: Mapping[str, float], budget_s: float) -> PlannedPath:
         return self.api.begin_search(dict(targets), float(budget_s)).wait()
 
     @override
-    def follow_way(self, way: PlannedPath, source: str) -> Task:
-        return self._begin_there("Going round", lambda: self.api.begin_detour(way, source=source))
+    def follow_path(self, path: PlannedPath, source: str) -> Task:
+        return self._begin_there(
+            "Following a path", lambda: self.api.begin_detour(path, source=source)
+        )
 
     @override
     def initialise_platform(

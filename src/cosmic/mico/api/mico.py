@@ -29,7 +29,7 @@ from cosmic.frame.threads import forbid_waiting_here, may_wait_here
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.frame.weakly import weakly
 from cosmic.mico.api.application import MicoApplication
-from cosmic.mico.api.application_base import WAY_BUDGET_S, MicoApplicationBase
+from cosmic.mico.api.application_base import PATH_BUDGET_S, MicoApplicationBase
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.collision import Collision
@@ -47,11 +47,11 @@ from cosmic.mico.api.news import (
     follow_movements,
     follow_positions,
 )
+from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.api.poses import Poses
 from cosmic.mico.api.tools import Tools
 from cosmic.mico.api.trajectories import Trajectories
 from cosmic.mico.api.trajectory_recording import Recordings
-from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.collision.collision_manager import CollisionManager
@@ -540,9 +540,13 @@ class Mico(Declared):
             motions = self._targets(targets)
         except MoveRefused as exc:
             return exc.verdict
-        return self.judge(motions)
+        return self.verdict_on(motions)
 
-    def judge(self, motions: Mapping[str, SentMotion], *, consent: bool = False) -> MoveVerdict:
+    judge = Renamed("verdict_on")
+
+    def verdict_on(
+        self, motions: Mapping[str, SentMotion], *, consent: bool = False
+    ) -> MoveVerdict:
         """Return the gate's answer to motions in gate coordinates, without moving.
 
         Where the axes are at another station and this thread must not wait (a window), it is what
@@ -677,7 +681,7 @@ class Mico(Declared):
     find_way = Renamed("plan_path")
 
     def plan_path(
-        self, targets: Mapping[str, Number], *, budget_s: float = WAY_BUDGET_S
+        self, targets: Mapping[str, Number], *, budget_s: float = PATH_BUDGET_S
     ) -> PlannedPath:
         """Plan a path to absolute targets around obstacles, without moving.
 
@@ -701,7 +705,7 @@ class Mico(Declared):
         """
         forbid_waiting_here("planning a path")
         places = {name: self._in_gate(name, value) for name, value in targets.items()}
-        return self._application.find_way(places, budget_s)
+        return self._application.plan_path(places, budget_s)
 
     @command
     def begin_search(self, targets: dict[str, float], budget_s: float) -> Operation[PlannedPath]:
@@ -713,7 +717,7 @@ class Mico(Declared):
     @command(moves=True)
     def begin_detour(self, way: PlannedPath, *, source: str = "script") -> Task:
         """Begin to go a path that was found, where the axes are; see `follow`."""
-        return self._home.follow_way(way, source_of(source))
+        return self._home.follow_path(way, source_of(source))
 
     def follow(
         self,
@@ -731,10 +735,10 @@ class Mico(Declared):
         MoveRefused
             The gate refused a part: something has moved since.
         """
-        return self._follow(self._application.follow_way(way, self._source), progress, wait=wait)
+        return self._follow(self._application.follow_path(way, self._source), progress, wait=wait)
 
     def move_around(
-        self, targets: Mapping[str, Number], *, budget_s: float = WAY_BUDGET_S, wait: bool = True
+        self, targets: Mapping[str, Number], *, budget_s: float = PATH_BUDGET_S, wait: bool = True
     ) -> Task:
         """Plan a path to absolute targets and follow it; raises as `plan_path` and `follow`."""
         return self.follow(self.plan_path(targets, budget_s=budget_s), wait=wait)

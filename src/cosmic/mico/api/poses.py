@@ -17,7 +17,7 @@ from cosmic.mico.core.motion.orders import Motion, MoveTo
 from cosmic.mico.core.motion.positioner import Confidence
 from cosmic.mico.core.poses import Pose, pose_misfits, pose_named
 
-WAY_BUDGET_S = 2.0
+PATH_BUDGET_S = 2.0
 
 
 @checked_class
@@ -166,7 +166,7 @@ class Poses(Declared):
             model = self._site.worker.collision
             if way and model is not None and model.available:
                 task.report(0.0, "planning a path")
-                parts = list(self._site.worker.find_way(pose.positions, WAY_BUDGET_S).waypoints)
+                parts = list(self._site.worker.plan_path(pose.positions, PATH_BUDGET_S).waypoints)
             for number, targets in enumerate(parts):
                 if task.cancel_requested:
                     raise MoveCancelled(f"the path to {pose.name} was abandoned")

@@ -65,7 +65,9 @@ class Axes(Protocol):
         """Return the state of every axis."""
 
     @abstractmethod
-    def judge(self, motions: Mapping[str, SentMotion], *, consent: bool = False) -> MoveVerdict:
+    def verdict_on(
+        self, motions: Mapping[str, SentMotion], *, consent: bool = False
+    ) -> MoveVerdict:
         """Return the gate's answer."""
 
     @abstractmethod
@@ -141,7 +143,7 @@ class Tool:
 
     def check(self, point_um: Sequence[float], frame: FrameName = "world") -> MoveVerdict:
         """Return the gate's answer to going there, without moving."""
-        return self._axes.judge(self.motions(point_um, frame))
+        return self._axes.verdict_on(self.motions(point_um, frame))
 
     def move_to(
         self,

@@ -7,8 +7,8 @@ from threading import Lock
 from cosmic.frame.errors import CosmicError, DeviceError, MoveCancelled, MoveRefused, refusal
 from cosmic.frame.operation import Task
 from cosmic.mico.api.group import GroupMovement
-from cosmic.mico.api.trajectory_places import AwayFromStartError
 from cosmic.mico.api.trajectory_site import TrajectorySite
+from cosmic.mico.api.trajectory_start import AwayFromStartError
 from cosmic.mico.core.motion.orders import Motion, MoveTo, Step
 from cosmic.mico.core.trajectory.binding import BoundLeg, BoundSpeed
 from cosmic.mico.core.trajectory.timing import scaled_hz

@@ -8,8 +8,8 @@ from cosmic.frame.errors import MoveCancelled, refusal
 from cosmic.frame.operation import Task
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.api.trajectory_moves import LegMover
-from cosmic.mico.api.trajectory_places import Places
 from cosmic.mico.api.trajectory_site import TrajectorySite
+from cosmic.mico.api.trajectory_start import StartPositions
 from cosmic.mico.api.trajectory_state import PlayControl
 from cosmic.mico.core.trajectory.binding import Bound, BoundLeg, BoundSpeed, BoundStep
 from cosmic.mico.core.trajectory.model import Wait
@@ -30,7 +30,7 @@ class TrajectoryRun:
         self._control = control
         self._clock = site.manager.clock
         self.mover = LegMover(site, source)
-        self.places = Places(site, bound)
+        self.start_positions = StartPositions(site, bound)
         self.rehearsal: Rehearsal | None = None
         self.next = 0
         self.loop = 1
@@ -71,8 +71,8 @@ class TrajectoryRun:
 
     def refuse_away(self) -> None:
         """Raise `AwayFromStartError` where axes do not stand where it begins or goes on."""
-        wanted = self.places.wanted(self.following, begun=self.begun)
-        self.places.refuse_away(wanted, begun=self.begun)
+        wanted = self.start_positions.wanted(self.following, begun=self.begun)
+        self.start_positions.refuse_away(wanted, begun=self.begun)
 
     def heed_stops(self) -> None:
         """Have every stop from now on end what is played next."""
@@ -124,17 +124,17 @@ class TrajectoryRun:
             raise refusal(replace(found.verdict, text=text))
         control = self._control
         if not self.begun and control.loops != 1 and control.start == "refuse":
-            self.places.check_loop(found.end)
+            self.start_positions.check_loop(found.end)
         self._go_to_place(task, say)
 
     def _go_to_place(self, task: Task, say: Callable[[str], None]) -> None:
-        wanted = self.places.wanted(self.following, begun=self.begun)
-        if self.places.stands(wanted):
+        wanted = self.start_positions.wanted(self.following, begun=self.begun)
+        if self.start_positions.stands(wanted):
             return
         if self._control.start == "refuse":
-            self.places.refuse_away(wanted, begun=self.begun)
+            self.start_positions.refuse_away(wanted, begun=self.begun)
         say("going to where it begins")
-        for waypoint in self.places.waypoints(wanted, self._control.start):
+        for waypoint in self.start_positions.waypoints(wanted, self._control.start):
             self._look_for_stop(task)
             self.mover.go_to(waypoint, task)
 
@@ -160,7 +160,7 @@ class TrajectoryRun:
             return True
         self.loop += 1
         self.next = 0
-        self.places.begin_again()
+        self.start_positions.begin_again()
         return False
 
     def _line_text(self, line: int) -> str:
@@ -180,7 +180,7 @@ class TrajectoryRun:
                 if not self._wait_at(step.at_s, task):
                     return False
                 self.mover.move(step, self._control.speed, task)
-                self.places.note(step)
+                self.start_positions.note(step)
                 return True
 
     # Time

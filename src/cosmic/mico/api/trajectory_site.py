@@ -11,7 +11,7 @@ from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Operation, Task
 from cosmic.frame.task_application import Job
-from cosmic.mico.api.ways import PlannedPath
+from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.motion.checks import Limits
@@ -40,8 +40,8 @@ class Worker(Protocol):
     def begin(self, title: str, job: Job) -> Task:
         """See `TaskApplication.begin`."""
 
-    def find_way(self, targets: Mapping[str, float], budget_s: float) -> PlannedPath:
-        """See `MicoApplication.find_way`."""
+    def plan_path(self, targets: Mapping[str, float], budget_s: float) -> PlannedPath:
+        """See `MicoApplication.plan_path`."""
 
 
 class TrajectorySite:

@@ -8,8 +8,8 @@ from PySide6.QtCore import QObject, Signal
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.relay import Relay
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.api.trajectory_places import AwayFromStartError
 from cosmic.mico.api.trajectory_player import TrajectoryPlayer
+from cosmic.mico.api.trajectory_start import AwayFromStartError
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState, StartMode
 from cosmic.mico.core.trajectory.model import Trajectory
 from cosmic.mico.gui.trajectory_bars import RunBar, StartQuestion

@@ -10,7 +10,7 @@ from cosmic.mico.api.trajectory_state import StartMode
 from cosmic.mico.core.motion.orders import MoveTo
 from cosmic.mico.core.trajectory.binding import Bound, BoundLeg, BoundStep
 
-WAY_BUDGET_S: Final = 2.0
+PATH_BUDGET_S: Final = 2.0
 _SLACK: Final = 2.0
 """How many tolerances an axis may stand away from where a line left it."""
 
@@ -29,7 +29,7 @@ class AwayFromStartError(NotAvailable):
         self.targets = dict(targets)
 
 
-class Places:
+class StartPositions:
     """Keeps where each line has left the axes; one thread at a time."""
 
     def __init__(self, site: TrajectorySite, bound: Bound) -> None:
@@ -106,4 +106,4 @@ class Places:
         """Return the way to where the axes should stand; raises `MoveRefused`."""
         if mode == "straight" or self._site.worker.collision is None:
             return (wanted,)
-        return self._site.worker.find_way(wanted, WAY_BUDGET_S).waypoints
+        return self._site.worker.plan_path(wanted, PATH_BUDGET_S).waypoints
