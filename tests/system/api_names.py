@@ -38,6 +38,13 @@ from cosmic.autonomy.procedures.operation import OperationFailed, UnitOperation
 from cosmic.autonomy.procedures.run import ProcedureRun, RunState
 from cosmic.autonomy.procedures.times import OperationStatistics, OperationTimes
 from cosmic.autonomy.procedures.tree import NodeEvent, NodeState, NodeView
+from cosmic.autonomy.shipped.fibre_handling import (
+    FibreHandling,
+    OperationPreview,
+    OperationRequest,
+    OperationResult,
+    SingleOperation,
+)
 from cosmic.daqco.api.channel_shape import ChannelHandle
 from cosmic.daqco.api.daqco import Daqco, DaqCounters, DaqLimit
 from cosmic.daqco.api.recorder import RecordingState
@@ -193,6 +200,10 @@ CLASSES: Final[dict[str, type]] = {
     "CampaignReader": CampaignReader,
     "FibreRecord": FibreRecord,
     "Shape": Shape,
+    "FibreHandling": FibreHandling,
+    "OperationRequest": OperationRequest,
+    "OperationPreview": OperationPreview,
+    "OperationResult": OperationResult,
     "CalibrationRegistry": CalibrationRegistry,
     "CalibrationEntry": CalibrationEntry,
 }
@@ -216,6 +227,7 @@ ENUMS: Final[dict[str, type[Enum]]] = {
     "Quality": Quality,
     "Outcome": Outcome,
     "CalibrationStanding": CalibrationStanding,
+    "SingleOperation": SingleOperation,
 }
 # Exceptions that a script may want to name and that `cosmic` does not export.
 FURTHER_EXCEPTIONS: Final = (

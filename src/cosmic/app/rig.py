@@ -15,7 +15,7 @@ from cosmic.app.simulation import SimulationFaults
 from cosmic.app.stations.remote_station import RemoteStation, StationControl
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.procedures.procedure import Procedure
-from cosmic.autonomy.procedures.run import ProcedureRun
+from cosmic.autonomy.procedures.run import ProcedureRun, RunState
 from cosmic.daqco.api.daqco import Daqco, daqco_of
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from cosmic.autonomy.campaign.recipe import Recipe
     from cosmic.autonomy.handling.context import HandlingContext
     from cosmic.autonomy.handling.settings import HandlingSettings
+    from cosmic.autonomy.shipped.fibre_handling import FibreHandling
 
 W = TypeVar("W")
 
@@ -55,6 +56,7 @@ class Rig:
                 rate=platform.clock.rate,
             )
         self._runs: WeakSet[ProcedureRun[object] | Campaign] = WeakSet()
+        self._handling: FibreHandling | None = None
         self._closed = False
 
     @override
@@ -137,6 +139,8 @@ class Rig:
         """
         from cosmic.app.procedures import campaign_on  # loads statistics, which takes a second
 
+        if self._handling is not None and self._handling.running:
+            raise NotAvailable("an operation on a fibre is running; wait until it has ended")
         campaign = campaign_on(self, self._platform, recipe, folder)
         self._runs.add(campaign)
         return campaign
@@ -190,6 +194,33 @@ class Rig:
 
         run.on_change(close)
         return run
+
+    @property
+    def handling(self) -> "FibreHandling":
+        """Fibres handled one operation at a time: take, bring, push, measure, put away, undo.
+
+        Raises
+        ------
+        NotAvailable
+            An application is not hosted here.
+        """
+        if self._handling is None:
+            from cosmic.autonomy.shipped.fibre_handling import FibreHandling
+
+            self._handling = FibreHandling(self, self.procedure, self._running)
+        return self._handling
+
+    def _running(self) -> str:
+        """Return which campaign or procedure runs, in words; empty for none."""
+        from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
+
+        for each in list(self._runs):
+            if isinstance(each, Campaign):
+                if not each.over and each.phase is not CampaignPhase.READY:
+                    return "a campaign"
+            elif not each.over and each.state is not RunState.READY:
+                return each.name
+        return ""
 
     def procedure(self, procedure: Procedure[W], work: W) -> ProcedureRun[W]:
         """Return a run of `procedure` that is ready to begin, in the platform's time.
@@ -330,6 +361,8 @@ class Rig:
         if not self._closed:
             self._closed = True
             atexit.unregister(self.close)
+            if self._handling is not None:
+                self._handling.close()
             for run in list(self._runs):
                 run.abort("the platform is closed")
                 run.join()

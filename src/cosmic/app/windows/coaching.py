@@ -7,6 +7,7 @@ from cosmic.app.panels.coach import Rule, Step
 from cosmic.app.panels.force import ForcePanel
 from cosmic.app.panels.tool import ToolPanel
 from cosmic.app.rig import Rig
+from cosmic.app.windows.fibre_menu import FibreOperations
 from cosmic.app.windows.stage import Stage
 from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.errors import CosmicError
@@ -23,6 +24,7 @@ class Parts(Protocol):
     stage: Stage
     tool: ToolPanel
     force: ForcePanel | None
+    operations: FibreOperations | None
 
 
 def coach_rules(
@@ -32,7 +34,7 @@ def coach_rules(
     rules = _Rules(window, rig, gui, parts)
     first = (rules.not_ready, rules.stopped, rules.limit_crossed, rules.position_unknown)
     missing = (rules.lens_unknown, rules.camera_stopped, rules.nothing_acquired, rules.disarmed)
-    return (*first, *missing, rules.task)
+    return (*first, *missing, rules.fibre, rules.task)
 
 
 class _Rules:
@@ -133,6 +135,31 @@ class _Rules:
         limit: LimitSettings = off.settings.model_copy(update={"armed": True})
         text = f"The limit of {limit.channel} is disarmed; the probe can break. Arm it."
         return Step(text, "Arm limit", self._try(lambda: daqco.set_limit(limit)))
+
+    def fibre(self) -> Step | None:
+        """Look at the fibre that is held, or at how to come to one."""
+        spaces, operations = self._window.workspaces, self._parts.operations
+        if operations is None or spaces is None or spaces.current not in ("Handle", "Measure"):
+            return None
+        if operations.running:
+            return Step("The operation runs; its card is on the picture. Escape or STOP stops it.")
+        request = operations.next_request()
+        if request is not None:
+            holder = operations.handling.held_by
+            text = f"The {holder} gripper holds a fibre. {request.title} comes next."
+            return Step(text, request.title, lambda: operations.begin(request))
+        view = self._parts.stage.camera
+        found = view.camera.analysis
+        if spaces.current != "Handle" or operations.used:
+            return None
+        if found is None:
+            text = "To take a fibre, have the fibres found, then right-click one in the image."
+            return Step(text, "Find fibres", lambda: operations.find(view, on=True))
+        return (
+            Step("Right-click a fibre in the image to take it with a gripper.")
+            if (found.fibres)
+            else None
+        )
 
     def task(self) -> Step | None:
         """Propose what the workspace in front is for."""

@@ -372,6 +372,8 @@ class OperatorWindow(CosmicServerGui):
     def _is_moving(self) -> bool:
         """Tell whether Escape has something to stop."""
         campaign = self._campaign is not None and self._campaign.running
+        operations = self._tasks.operations if self._tasks is not None else None
+        campaign = campaign or (operations is not None and operations.running)
         mico = self._mico
         if campaign or mico is None or not mico.ready:
             return campaign

@@ -17,6 +17,8 @@ _INSET_SHARE: Final = 0.22
 _INSET_LEAST_PX: Final = 16 * STEP_PX
 _INSET_ASPECT: Final = 4 / 3
 _USUAL_ASPECT: Final = 4 / 3
+_CARD_ABOVE_PX: Final = 4 * STEP_PX
+"""Room below the card, in which the image says where the mouse is."""
 
 
 class Stage(QWidget):
@@ -53,6 +55,7 @@ class Stage(QWidget):
         self._scene_large = False
         self._inset_wanted = True
         self._bar: QWidget | None = None
+        self._card: QWidget | None = None
         self._frame = named(QFrame(self), "stageInset")
         self._frame.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         for each in (*self._cameras.values(), scene):
@@ -84,6 +87,22 @@ class Stage(QWidget):
         bar.setParent(self)
         self._bar = bar
         self._lay_out()
+
+    def set_card(self, card: QWidget) -> None:
+        """Have `card` over the picture, at the lower left, whenever it is shown."""
+        card.setParent(self)
+        card.hide()
+        self._card = card
+        self._lay_out()
+
+    def lay_card(self) -> None:
+        """Put the card where it belongs; it has grown or shrunk."""
+        if self._card is None:
+            return
+        bar_px = self._bar.height() if self._bar is not None else 0
+        top = self.height() - bar_px - self._card.height() - _CARD_ABOVE_PX
+        self._card.move(STEP_PX, max(0, top))
+        self._card.raise_()
 
     def show_large(self, title: str) -> None:
         """Show a camera or the scene large; the other becomes the inset."""
@@ -143,6 +162,7 @@ class Stage(QWidget):
         small.raise_()
         if self._bar is not None:
             self._bar.raise_()
+        self.lay_card()
 
     def _lay_bar(self, room: QRect) -> int:
         if self._bar is None:

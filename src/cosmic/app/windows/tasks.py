@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from cosmic.app.panels.alarms import AlarmBook, AlarmPanel, Level
 from cosmic.app.panels.calibrations import CALIBRATIONS
-from cosmic.app.panels.campaign.dock import CAMPAIGN, campaigns_folder
+from cosmic.app.panels.campaign.dock import CAMPAIGN, campaigns_folder, can_run
 from cosmic.app.panels.coach import Coach, Rule
 from cosmic.app.panels.force import ForcePanel
 from cosmic.app.panels.history import HistoryPanel
@@ -22,6 +22,7 @@ from cosmic.app.platform import Platform
 from cosmic.app.results.session_log import SessionLog
 from cosmic.app.results.sessions import SessionFolder
 from cosmic.app.rig import Rig
+from cosmic.app.windows.fibre_menu import FibreOperations
 from cosmic.app.windows.stage import Stage, column_of
 from cosmic.frame.failure import Failure
 from cosmic.frame.gui.clearance_meter import closeness
@@ -152,6 +153,10 @@ class TaskLayout(QObject):
         self.bar = ImageBar(rig.vico, {title: each.exposure for title, each in self._parts.items()})
         self.stage.set_bar(self.bar)
         self.tool = ToolPanel(gui)
+        self.operations: FibreOperations | None = None
+        if can_run(platform):
+            views = list(cameras.values())
+            self.operations = FibreOperations(rig, self.stage, scene, views, self)
         self.force = ForcePanel(rig.daqco, gui, self.folder) if instruments.force else None
         self.results = ResultsPanel(self._folders, platform.policy, self._model)
         self.book = AlarmBook(self)

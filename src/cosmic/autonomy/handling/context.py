@@ -49,6 +49,8 @@ class SharedWorkspace:
         The standard, where the last survey has seen it free.
     dropped : list of HeldFibre
         Those that were measured, and fell on the way to the bin: they lie on the plate again.
+    unsuitable : list of Candidate
+        Those of the last survey that are not taken, each with its problem.
     skip_reasons : Counter of str
         Why fibres of the last survey are not taken, and how many.
     finished : list of HeldFibre
@@ -71,6 +73,7 @@ class SharedWorkspace:
     skipped: list[Candidate] = field(default_factory=list)
     standard: Candidate | None = None
     dropped: list[HeldFibre] = field(default_factory=list)
+    unsuitable: list[Candidate] = field(default_factory=list)
     skip_reasons: Counter[str] = field(default_factory=Counter)
     zoomed: float | None = None
     surveyed: bool = False

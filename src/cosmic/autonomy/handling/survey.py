@@ -91,7 +91,8 @@ def look(work: HandlingContext, seen: list[SeenFibre]) -> None:
     checked = leave_dropped(checked, work.shared.dropped)
     checked = _leave_fallen(work, checked, before)
     work.shared.candidates = [each for each in checked if not each.problem]
-    work.shared.skip_reasons = Counter(each.problem for each in checked if each.problem)
+    work.shared.unsuitable = [each for each in checked if each.problem]
+    work.shared.skip_reasons = Counter(each.problem for each in work.shared.unsuitable)
     work.shared.surveyed, work.shared.since_survey, work.shared.survey_deg = True, 0, angle
 
 

@@ -195,6 +195,7 @@ QProgressBar[look="bar"] { min-height: 8px; border: none; }
 #stageInset { background: $panel; border: 1px solid $border_strong; }
 #imageBar { background: $panel; border-radius: 4px; }
 #coach { background: $raised; border: 1px solid $border; border-radius: 4px; }
+#operationCard { background: $raised; border: 1px solid $border_strong; border-radius: 4px; }
 #padButton { padding: 0px; min-width: 30px; max-width: 46px; min-height: 26px; }
 #axisTable QPushButton, #axisTable QToolButton, #axisTable QLineEdit {
     padding: 1px 5px; min-height: 18px;

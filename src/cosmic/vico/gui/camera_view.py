@@ -27,6 +27,7 @@ from cosmic.vico.gui.image_tools import ImageTools
 from cosmic.vico.gui.image_view import CameraImageView
 from cosmic.vico.gui.layers import CornerText, Crosshair, Note, ScaleBar
 from cosmic.vico.gui.levels import Histogram, histogram
+from cosmic.vico.gui.mark_layer import MarkLayer
 from cosmic.vico.gui.record_bar import RecordBar
 from cosmic.vico.gui.seen_layer import SeenLayer
 from cosmic.vico.gui.settings_form import SettingsForm
@@ -106,7 +107,7 @@ class CameraView(QWidget):
         self._pointed: Pixel | None = None
         self.view = CameraImageView()
         self.cross, self.scale_bar = Crosshair(), ScaleBar()
-        self.seen, self.note = SeenLayer(), Note()
+        self.seen, self.mark, self.note = SeenLayer(), MarkLayer(), Note()
         self.row, self.status = ToolRow(), StatusRow(self._camera)
         self.calibrate = self.row.add(CalibrateButton(self._camera))
         self.contrast, self.chain = ContrastPanel(), ChainPanel(self._camera)
@@ -116,7 +117,14 @@ class CameraView(QWidget):
         self.pointer, self.message = CornerText(top=False), CornerText(top=True)
         self.tools = ImageTools(self.view, self.row, self._camera, self)
         corners = (self.scale_bar, self.pointer, self.message)
-        self.view.layers = [self.cross, self.seen, *self.tools.layers, *corners, self.note]
+        self.view.layers = [
+            self.cross,
+            self.seen,
+            self.mark,
+            *self.tools.layers,
+            *corners,
+            self.note,
+        ]
         self._look = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=LOOK_MS)
         self._readout = QTimer(self, interval=READOUT_MS)
         self._build()

@@ -22,9 +22,13 @@ class ImageTools(QObject):
         One line for the operator: what was begun, or why not.
     region_chosen(int, int, int, int)
         x, y, width and height of the part to be read, in pixels of the image shown.
+    menu_made(QMenu, object)
+        The menu of the right button is about to be shown, for whoever has more to offer; and the
+        pixel that was clicked.
     """
 
     message = Signal(str)
+    menu_made = Signal(QMenu, object)
     region_chosen = Signal(int, int, int, int)
 
     def __init__(
@@ -112,6 +116,7 @@ class ImageTools(QObject):
             self.measures.chosen = near
             self._view.redraw()
         menu = self.make_menu()
+        self.menu_made.emit(menu, self._view.pixel_at(point))
         menu.aboutToHide.connect(menu.deleteLater)
         menu.popup(self._view.mapToGlobal(point.toPoint()))
 

@@ -1,0 +1,219 @@
+"""The card on the picture of one operation on a fibre: what it is at, and what came of it."""
+
+from typing import TYPE_CHECKING, Final
+
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtWidgets import (
+    QFrame,
+    QGridLayout,
+    QLabel,
+    QProgressBar,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from cosmic.autonomy.procedures.run import OVER, ProcedureRun, RunState
+from cosmic.autonomy.procedures.tree import ENDS, OPERATION, UNDER_WAY, NodeView
+from cosmic.daqco.gui.value_field import ValueField
+from cosmic.frame.gui.build import named, push_button, styled, tight_row
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.state_badge import StateBadge
+from cosmic.frame.gui.theme import STEP_PX, State, number_font
+
+if TYPE_CHECKING:
+    from cosmic.autonomy.handling.context import HandlingContext
+    from cosmic.autonomy.shipped.fibre_handling import OperationResult
+
+CARD_PX: Final = 38 * STEP_PX
+LOOK_MS: Final = 150
+_MOST_VALUES: Final = 4
+
+
+def share_done(view: NodeView) -> float:
+    """Return how much of a procedure is behind it, 0 to 1, by its operations."""
+    parts = [each for each in view.walk() if each.kind == OPERATION]
+    behind = sum(each.state in ENDS for each in parts)
+    return behind / len(parts) if parts else 0.0
+
+
+def at_work(view: NodeView) -> str:
+    """Return the operation that is carried out now; empty for none."""
+    running = (each.name for each in view.walk() if each.kind == OPERATION)
+    states = {each.name: each.state for each in view.walk() if each.kind == OPERATION}
+    return next((name for name in running if states[name] in UNDER_WAY), "")
+
+
+class OperationCard(QFrame):
+    """Shows one operation while it runs and how it ended; GUI thread.
+
+    Signals
+    -------
+    next_requested()
+        The button of the next operation was pressed.
+    undo_requested()
+        What was done last is to be taken back.
+    push_requested(float)
+        The fibre is to be pushed to that force, uN.
+    resized()
+        It needs another place: it shows more, or less.
+    """
+
+    next_requested = Signal()
+    undo_requested = Signal()
+    push_requested = Signal(float)
+    resized = Signal()
+
+    def __init__(self, force_un: float, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("operationCard")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setFixedWidth(CARD_PX)
+        self._run: ProcedureRun[HandlingContext] | None = None
+        self._offered: dict[QWidget, bool] = {}
+        self.badge = StateBadge(State.BUSY)
+        self.title = named(ElidedLabel(), "operationTitle")
+        self.line = named(QLabel(), "operationLine")
+        self.line.setWordWrap(True)
+        self.line.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.MinimumExpanding)
+        self.progress = named(QProgressBar(), "operationProgress")
+        self.progress.setRange(0, 100)
+        self.progress.setAccessibleName("Progress of the operation")
+        self.stop = named(
+            push_button("End", "End it: moves are cancelled, then the tools are made safe"),
+            "operationStop",
+        )
+        self.close_button = styled(push_button("✕", "Close this card"), "narrow")
+        self.next = named(push_button("", ""), "operationNext")
+        self.undo = named(push_button("Undo", ""), "operationUndo")
+        self.force = named(ValueField("Force to push to; Enter pushes", "uN"), "operationForce")
+        self.force.set_value(force_un)
+        self.push = named(push_button("Push", "Push the fibre to this force"), "operationPush")
+        self._values: list[tuple[QLabel, QLabel]] = []
+        self._build()
+        self._connect()
+        self._look = QTimer(self, interval=LOOK_MS)
+        self._look.timeout.connect(self.refresh)
+        self.hide()
+
+    def _build(self) -> None:
+        head, row = tight_row(STEP_PX)
+        row.addWidget(self.badge)
+        row.addWidget(self.title, 1)
+        row.addWidget(self.close_button)
+        values, grid = QWidget(), QGridLayout()
+        values.setLayout(grid)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(STEP_PX)
+        grid.setVerticalSpacing(0)
+        grid.setColumnStretch(1, 1)
+        for number in range(_MOST_VALUES):
+            pair = QLabel(), named(QLabel(), "operationValue")
+            pair[1].setFont(number_font(bold=True))
+            for column, label in enumerate(pair):
+                grid.addWidget(label, number, column)
+            self._values.append(pair)
+        foot, row = tight_row(STEP_PX // 2)
+        for widget in (self.next, self.force, self.push, self.undo):
+            row.addWidget(widget)
+        self._foot = foot
+        column = QVBoxLayout(self)
+        column.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX // 2)
+        column.setSpacing(STEP_PX // 2)
+        for widget in (head, self.line, values, self.progress, self.stop, foot):
+            column.addWidget(widget)
+
+    def _connect(self) -> None:
+        self.stop.clicked.connect(self._on_stop)
+        self.close_button.clicked.connect(self.hide)
+        self.next.clicked.connect(self.next_requested)
+        self.undo.clicked.connect(self.undo_requested)
+        self.push.clicked.connect(self._on_push)
+        self.force.returnPressed.connect(self._on_push)
+
+    # What is shown
+
+    def follow(self, title: str, run: "ProcedureRun[HandlingContext]") -> None:
+        """Show a run from its begin to its end."""
+        self._run = run
+        self.title.set_text(title)
+        self._show_values(())
+        self._look.start()
+        self.refresh()
+        self._fit()
+
+    def show_result(self, result: "OperationResult") -> None:
+        """Show how an operation ended."""
+        self._run = None
+        self._look.stop()
+        self.title.set_text(result.title)
+        self.badge.set_state(State.OK if result.good else State.ERROR)
+        self.line.setText(result.text)
+        self._show_values(result.values)
+        self._fit()
+
+    def show_refused(self, title: str, why: str) -> None:
+        """Show that an operation did not begin, and why."""
+        self._run = None
+        self._look.stop()
+        self.title.set_text(title)
+        self.badge.set_state(State.REFUSED)
+        self.line.setText(why)
+        self._show_values(())
+        self._fit()
+
+    def offer(self, follow_up: str, *, push: bool, undo: str) -> None:
+        """Offer the next operation by its title, a push, and to undo; empty for none."""
+        self._offered = {
+            self.next: bool(follow_up),
+            self.force: push,
+            self.push: push,
+            self.undo: bool(undo),
+        }
+        self.next.setText(follow_up)
+        self.next.setToolTip(follow_up)
+        self.undo.setToolTip(undo)
+        self._fit()
+
+    def _show_values(self, values: tuple[tuple[str, str], ...]) -> None:
+        for number, (name, value) in enumerate(self._values):
+            shown = number < len(values)
+            name.setVisible(shown)
+            value.setVisible(shown)
+            if shown:
+                name.setText(values[number][0])
+                value.setText(values[number][1])
+
+    def refresh(self) -> None:
+        """Show what the run is at now."""
+        run = self._run
+        if run is None or run.state in OVER:
+            return
+        ending = run.state is RunState.ABORTING
+        self.badge.set_state(State.REFUSED if ending else State.BUSY)
+        view = run.tree
+        self.line.setText("ending, and making safe" if ending else at_work(view))
+        self.progress.setValue(round(100 * share_done(view)))
+        self.stop.setEnabled(not ending)
+
+    def _fit(self) -> None:
+        running = self._run is not None
+        self.progress.setVisible(running)
+        self.stop.setVisible(running)
+        self.close_button.setVisible(not running)
+        for widget, wanted in self._offered.items():
+            widget.setVisible(wanted and not running)
+        self._foot.setVisible(not running and any(self._offered.values()))
+        self.show()
+        self.adjustSize()
+        self.resized.emit()
+
+    # What the operator does
+
+    def _on_stop(self) -> None:
+        if self._run is not None:
+            self._run.abort("ended by the operator")
+
+    def _on_push(self) -> None:
+        if self.force.take():
+            self.push_requested.emit(self.force.value())

@@ -1,0 +1,232 @@
+"""Operations on a fibre from the picture: right-click it, see what would happen, choose."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QMenu
+
+from cosmic.app.panels.operation_card import OperationCard
+from cosmic.app.panels.scene import ScenePanel
+from cosmic.app.rig import Rig
+from cosmic.app.windows.stage import Stage
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.relay import Relay
+from cosmic.vico.api.coordinate_transform import Pixel
+from cosmic.vico.core.vision.fibre import Fibre
+from cosmic.vico.gui.camera_view import CameraView
+from cosmic.vico.gui.mark_layer import NEAR_PX, fibre_at
+
+if TYPE_CHECKING:
+    from cosmic.autonomy.shipped.fibre_handling import FibreHandling, OperationRequest
+
+USUAL_FORCE_UN: Final = 50.0
+_FIBRES: Final = "fibres"
+
+
+class FibreOperations(QObject):
+    """Joins the pictures to `rig.handling`; GUI thread.
+
+    Parameters
+    ----------
+    rig : Rig
+        The platform.
+    stage : Stage
+        Where cameras are shown, and the card.
+    scene : ScenePanel
+        Where the path of an operation is drawn before it begins.
+
+    Signals
+    -------
+    began(str)
+        An operation has begun, by its title.
+    ended()
+        One has ended, or was refused.
+    """
+
+    began = Signal(str)
+    ended = Signal()
+
+    def __init__(
+        self, rig: Rig, stage: Stage, scene: ScenePanel, cameras: list[CameraView], parent: QObject
+    ) -> None:
+        super().__init__(parent)
+        self._rig, self._stage, self._scene = rig, stage, scene
+        self.card = OperationCard(USUAL_FORCE_UN)
+        stage.set_card(self.card)
+        self._relay: Relay[()] | None = None
+        self._shown: object = None
+        self.card.resized.connect(stage.lay_card)
+        self.card.next_requested.connect(self._on_next)
+        self.card.undo_requested.connect(self.undo)
+        self.card.push_requested.connect(self.push)
+        for view in cameras:
+            view.tools.menu_made.connect(self._offer_on(view))
+
+    def _offer_on(self, view: CameraView) -> Callable[[QMenu, Pixel], None]:
+        return lambda menu, point_px: self.offer(view, menu, point_px)
+
+    @property
+    def handling(self) -> "FibreHandling":
+        """What carries the operations out; raises `NotAvailable`."""
+        found = self._rig.handling
+        if self._relay is None:
+            self._relay = Relay(self._on_change).follow(found.subscribe)
+        return found
+
+    @property
+    def running(self) -> bool:
+        """True while an operation runs."""
+        return self.used and self.handling.running
+
+    @property
+    def used(self) -> bool:
+        """True once an operation was asked for: what carries them out is loaded."""
+        return self._relay is not None
+
+    # The menu
+
+    def offer(self, view: CameraView, menu: QMenu, point_px: Pixel) -> None:
+        """Add what can be done with the fibre at a pixel, and with the one that is held."""
+        from cosmic.autonomy.handling.marked import MarkedFibre
+        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+
+        found = view.camera.analysis
+        near = NEAR_PX / max(abs(view.view.to_screen.m11()), 1e-6)
+        fibre = fibre_at(found, point_px, near)
+        try:
+            handling = self.handling
+        except CosmicError as exc:
+            menu.addSeparator()
+            menu.addAction(f"Not available: {exc}").setEnabled(False)
+            return
+        menu.addSeparator()
+        self._offer_finding(view, menu)
+        marked = None
+        if fibre is not None and found is not None:
+            marked = MarkedFibre(found.image, np.asarray(fibre.centre_line_px, float))
+        requests = [
+            OperationRequest(SingleOperation.TAKE, gripper, marked=marked)
+            for gripper in handling.grippers
+        ]
+        requests += [
+            OperationRequest(SingleOperation.BRING),
+            OperationRequest(SingleOperation.PUSH, force_un=self.card.force.value()),
+            OperationRequest(SingleOperation.MEASURE),
+            OperationRequest(SingleOperation.PUT_AWAY),
+            OperationRequest(SingleOperation.UNDO),
+        ]
+        for request in requests:
+            self._offer_one(view, menu, request, fibre)
+        menu.aboutToHide.connect(lambda: self._show_preview(view, None))
+        menu.setToolTipsVisible(True)
+
+    def _offer_finding(self, view: CameraView, menu: QMenu) -> None:
+        link = next((each for each in view.camera.algorithms if each.name == _FIBRES), None)
+        if link is None:
+            return
+        action = menu.addAction("Find fibres")
+        action.setCheckable(True)
+        action.setChecked(link.on)
+        action.triggered.connect(lambda on: self.find(view, on=on))
+
+    def find(self, view: CameraView, *, on: bool) -> None:
+        """Have fibres found on the images of a camera, or not."""
+        try:
+            view.camera.switch(_FIBRES, on=on)
+        except CosmicError as exc:
+            view.say(str(exc))
+
+    def _offer_one(
+        self, view: CameraView, menu: QMenu, request: "OperationRequest", fibre: Fibre | None
+    ) -> None:
+        action = menu.addAction(request.title)
+        why = self.handling.why_not(request)
+        action.setEnabled(not why)
+        if why:
+            action.setToolTip(f"Not now: {why}")
+            return
+        line = None if request.marked is None or fibre is None else request.marked.line_px
+        action.hovered.connect(lambda: self._show_preview(view, request, line))
+        action.triggered.connect(lambda: self.begin(request))
+
+    def _show_preview(
+        self, view: CameraView, request: "OperationRequest | None", line: np.ndarray | None = None
+    ) -> None:
+        """Outline the fibre, draw the path in the scene and say what would happen; None: end."""
+        view.mark.show(line)
+        if request is None:
+            self._scene.set_planned(None)
+            view.say("")
+            return
+        preview = self.handling.preview(request)
+        self._scene.set_planned([dict(pose) for pose in preview.poses] or None)
+        view.say(f"{request.title}: {preview.text}")
+
+    # Carrying out
+
+    def begin(self, request: "OperationRequest") -> None:
+        """Begin an operation, or say on the card why it cannot begin."""
+        try:
+            run = self.handling.prepare(request)
+        except CosmicError as exc:
+            self.card.show_refused(request.title, str(exc).removeprefix(f"{request.title}: "))
+            self._offer_next()
+            self.ended.emit()
+            return
+        self.card.follow(request.title, run)
+        run.start()
+        self.began.emit(request.title)
+
+    def push(self, force_un: float) -> None:
+        """Push the held fibre to a force."""
+        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+
+        self.begin(OperationRequest(SingleOperation.PUSH, force_un=force_un))
+
+    def undo(self) -> None:
+        """Take back what was done last with the held fibre."""
+        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+
+        self.begin(OperationRequest(SingleOperation.UNDO))
+
+    def _on_next(self) -> None:
+        request = self.next_request()
+        if request is not None:
+            self.begin(request)
+
+    def next_request(self) -> "OperationRequest | None":
+        """Return the operation that usually comes next; None where none does, or one runs."""
+        if not self.used or self.running or not self.handling.held_by:
+            return None
+        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+
+        pushed = self.handling.last in (SingleOperation.PUSH, SingleOperation.MEASURE)
+        if pushed:
+            return OperationRequest(SingleOperation.PUT_AWAY)
+        if self.handling.at_probe:
+            return OperationRequest(SingleOperation.PUSH, force_un=self.card.force.value())
+        return OperationRequest(SingleOperation.BRING)
+
+    def _on_change(self) -> None:
+        result = self.handling.result
+        if self.handling.running or result is None or result is self._shown:
+            self.card.refresh()
+            return
+        self._shown = result
+        self.card.show_result(result)
+        self._offer_next()
+        self.ended.emit()
+
+    def _offer_next(self) -> None:
+        from cosmic.autonomy.shipped.fibre_handling import UNDO_WORDS, SingleOperation
+
+        handling, request = self.handling, self.next_request()
+        at_probe = bool(handling.held_by) and handling.at_probe
+        push = request is not None and request.operation is SingleOperation.PUSH
+        self.card.offer(
+            request.title if request is not None and not push else "",
+            push=at_probe,
+            undo=UNDO_WORDS[handling.last] if handling.held_by and handling.last else "",
+        )

@@ -1,0 +1,501 @@
+"""`FibreHandling`: fibres handled by hand, one operation at a time, each a run of a procedure."""
+
+import logging
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from threading import RLock
+from typing import Final, Protocol, get_args
+
+from typing_extensions import override
+
+from cosmic.autonomy.bending.result import BendingResult
+from cosmic.autonomy.campaign.formatting import EI_LABEL, interval, stiffness, with_interval
+from cosmic.autonomy.handling.context import Applications, HandlingContext, vision_of
+from cosmic.autonomy.handling.held_fibre import HeldFibre
+from cosmic.autonomy.handling.marked import MarkedFibre, approach_to
+from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.handling.single import PushToForce, is_at_probe
+from cosmic.autonomy.procedures.failures import ProcedureStopped
+from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.procedures.run import ProcedureRun, RunState
+from cosmic.autonomy.shipped.single import (
+    build_bring,
+    build_carry_back,
+    build_lay_back,
+    build_measure,
+    build_push,
+    build_put_away,
+    build_retract,
+    build_take,
+)
+from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
+from cosmic.frame.events import Event, Unsubscribe
+from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.core.motion.positioner import positions_of
+
+logger = logging.getLogger(__name__)
+
+USUAL_FORCE_UN: Final = 50.0
+GRIPPERS: Final[tuple[str, ...]] = get_args(HandlingSettings.model_fields["gripper"].annotation)
+
+
+class SingleOperation(StrEnum):
+    """What can be done with a fibre by itself; the value is the word."""
+
+    TAKE = "take"
+    BRING = "bring to the probe"
+    PUSH = "push"
+    MEASURE = "measure"
+    PUT_AWAY = "put away"
+    UNDO = "undo"
+
+
+PUSHES: Final = frozenset({SingleOperation.PUSH, SingleOperation.MEASURE})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OperationRequest:
+    """One operation that is wanted.
+
+    Attributes
+    ----------
+    gripper : str
+        Which one takes the fibre; every later operation is done with that one.
+    force_un : float
+        How far to push.
+    marked : MarkedFibre or None
+        The fibre to be taken.
+    """
+
+    operation: SingleOperation
+    gripper: str = ""
+    force_un: float = USUAL_FORCE_UN
+    marked: MarkedFibre | None = None
+
+    @property
+    def title(self) -> str:
+        """What it is called in the window."""
+        if self.operation is SingleOperation.TAKE:
+            return f"Take with {self.gripper}"
+        if self.operation is SingleOperation.PUSH:
+            return f"Push to {self.force_un:g} µN"
+        return self.operation.value.capitalize()
+
+
+@dataclass(frozen=True, slots=True)
+class OperationResult:
+    """How an operation ended.
+
+    Attributes
+    ----------
+    good : bool
+        It did what it should.
+    text : str
+        A sentence: what was found, or why it was refused or failed.
+    values : tuple of (str, str)
+        What was measured: a name, and the value with its 95 % interval and unit.
+    """
+
+    title: str
+    good: bool
+    text: str
+    values: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class OperationPreview:
+    """What an operation would do.
+
+    Attributes
+    ----------
+    text : str
+        In a sentence.
+    poses : tuple of mapping
+        Where all axes would be, one after the other, from where they are now; um or deg.
+    """
+
+    text: str
+    poses: tuple[Mapping[str, float], ...] = ()
+
+
+class MakeRun(Protocol):
+    """Makes a run of a procedure on a context, ready to begin."""
+
+    def __call__(
+        self, procedure: Procedure[HandlingContext], work: HandlingContext, /
+    ) -> ProcedureRun[HandlingContext]:
+        """Return it."""
+
+
+class FibreHandling:
+    """One fibre at a time, handled by single operations; any thread.
+
+    What is done here is what a campaign does, by the same operations. A fibre that one gripper
+    holds must be put away, or laid back, before another one is taken.
+
+    Parameters
+    ----------
+    rig : Applications
+        The platform.
+    make_run : callable
+        Returns a run that ends when motion is stopped.
+    busy : callable
+        Returns what else runs on the platform, in words; empty for nothing.
+    settings : HandlingSettings or None
+        Of all operations; gripper and other are set by what is asked for.
+
+    Raises
+    ------
+    NotAvailable
+        The cameras belong to another station.
+    """
+
+    def __init__(
+        self,
+        rig: Applications,
+        make_run: MakeRun,
+        busy: Callable[[], str],
+        settings: HandlingSettings | None = None,
+    ) -> None:
+        self._rig, self._make_run, self._busy = rig, make_run, busy
+        self._settings = settings or HandlingSettings()
+        tools = {each.name: each for each in vision_of(rig.vico).settings.tool}
+        self.grippers: tuple[str, ...] = tuple(
+            name for name in GRIPPERS if name in tools and tools[name].gap_axis
+        )
+        self._contexts: dict[str, HandlingContext] = {}
+        self._lock = RLock()
+        self._gripper = ""
+        self._done: list[SingleOperation] = []
+        self._run: ProcedureRun[HandlingContext] | None = None
+        self._result: OperationResult | None = None
+        self._changed: Event[[]] = Event()
+
+    @override
+    def __repr__(self) -> str:
+        return f"<FibreHandling, {self.held_by or 'no gripper'} holds a fibre>"
+
+    # What is known
+
+    @property
+    def run(self) -> ProcedureRun[HandlingContext] | None:
+        """The operation begun last; None before the first."""
+        return self._run
+
+    @property
+    def running(self) -> bool:
+        """True while an operation runs."""
+        run = self._run
+        return run is not None and not run.over and run.state is not RunState.READY
+
+    @property
+    def result(self) -> OperationResult | None:
+        """How the operation before ended; None before the first has."""
+        return self._result
+
+    @property
+    def fibre(self) -> HeldFibre | None:
+        """The fibre that is held, with all that became known of it."""
+        work = self._contexts.get(self._gripper)
+        fibre = work.fibre if work is not None else None
+        return fibre if fibre is not None and fibre.held else None
+
+    @property
+    def held_by(self) -> str:
+        """Which gripper holds a fibre; empty for none."""
+        return self._gripper if self.fibre is not None else ""
+
+    @property
+    def at_probe(self) -> bool:
+        """True where the held fibre is before the probe."""
+        if self.fibre is None:
+            return False
+        try:
+            return is_at_probe(self._contexts[self._gripper])
+        except NotAvailable:
+            return False
+
+    @property
+    def last(self) -> SingleOperation | None:
+        """What Undo would take back; None where there is nothing."""
+        return self._done[-1] if self._done else None
+
+    def subscribe(self, listener: Callable[[], object]) -> Unsubscribe:
+        """Call `listener()` when an operation has begun or ended, in any thread."""
+        return self._changed.subscribe(listener)
+
+    # What can be done
+
+    def why_not(self, request: OperationRequest) -> str:
+        """Return why an operation cannot begin now; empty where it can. Nothing moves."""
+        if self.running and self._run is not None:
+            return f"{self._run.name} is running; wait until it has ended, or stop it"
+        if other := self._busy():
+            return f"{other} is running; end it first"
+        if request.operation is SingleOperation.TAKE:
+            return self._why_not_take(request)
+        if self.fibre is None:
+            return "no gripper holds a fibre; take one first"
+        if request.operation is SingleOperation.UNDO:
+            return "" if self._done else "there is nothing to undo"
+        most = self._settings.push.limit_un
+        if request.operation is SingleOperation.PUSH and not 0.0 < request.force_un <= most:
+            return f"{request.force_un:g} µN is not between 0 and {most:g} µN"
+        if request.operation in PUSHES and not self.at_probe:
+            return "the fibre is not before the probe; bring it to the probe first"
+        return ""
+
+    def _why_not_take(self, request: OperationRequest) -> str:
+        if request.marked is None:
+            return "no fibre is marked; find the fibres, and choose one in the image"
+        if request.gripper not in self.grippers:
+            known = ", ".join(self.grippers) or "none"
+            return f"there is no gripper {request.gripper!r}; there are: {known}"
+        if self.fibre is not None:
+            return f"{self._gripper} holds a fibre; put it away first"
+        return ""
+
+    def preview(self, request: OperationRequest) -> OperationPreview:
+        """Return what an operation would do, or why it cannot begin; nothing moves."""
+        if why := self.why_not(request):
+            return OperationPreview(why)
+        if request.operation is SingleOperation.TAKE and request.marked is not None:
+            return self._preview_take(request.gripper, request.marked)
+        work = self._contexts[self._gripper]
+        positions = work.settings.places
+        now = positions_of(work.mico.states())
+        away = {work.probe.y_axis: positions.probe_away_y_um - work.probe.tip_um[1]}
+        if request.operation is SingleOperation.BRING:
+            x = positions.hold_x_um * work.jaws.forward
+            there = work.at(work.gripper, x, positions.hold_y_um, work.hold_tip_um)
+            return OperationPreview(
+                "The probe draws back, and the fibre is held before it.",
+                (now, now | away, now | away | there),
+            )
+        if request.operation is SingleOperation.PUT_AWAY:
+            x = positions.bin_x_um * work.jaws.forward
+            there = work.at(work.gripper, x, positions.bin_y_um, positions.bin_um)
+            return OperationPreview(
+                "The fibre is dropped into the bin, and the jaws are seen to be empty.",
+                (now, now | away, now | away | there),
+            )
+        if request.operation is SingleOperation.UNDO:
+            return OperationPreview(UNDO_WORDS[self._done[-1]], (now, now | away))
+        words = (
+            f"The probe pushes the fibre until it pushes back with {request.force_un:g} µN, and "
+            "goes back."
+            if request.operation is SingleOperation.PUSH
+            else f"The probe pushes the fibre at up to {work.settings.push.spans.count} spans."
+        )
+        return OperationPreview(words)
+
+    def _preview_take(self, gripper: str, marked: MarkedFibre) -> OperationPreview:
+        try:
+            work = self._context(gripper)
+            approach = approach_to(work, marked)
+        except CosmicError as exc:
+            return OperationPreview(f"{gripper} is calibrated first: {exc}")
+        if approach is None:
+            return OperationPreview(f"{gripper} cannot reach this fibre at any angle of the table.")
+        now = positions_of(work.mico.states())
+        above = work.at(work.gripper, *approach.tip_um, work.settings.places.travel_um)
+        turned = now | {work.table: approach.angle_deg}
+        down = work.at(work.gripper, *approach.tip_um, work.grasp_um)
+        return OperationPreview(
+            f"The table turns to {approach.angle_deg:.0f}°, {gripper} comes down around the end of "
+            "the fibre, closes and lifts it.",
+            (now, turned, turned | above, turned | down),
+        )
+
+    def prepare(self, request: OperationRequest) -> ProcedureRun[HandlingContext]:
+        """Return the run of an operation; begin it by `start` or `run_here`.
+
+        Raises
+        ------
+        NotAvailable
+            It cannot begin; the text says why, and nothing has moved.
+        ConfigError
+            The platform has no such tool, camera or force channel.
+        """
+        with self._lock:
+            if why := self.why_not(request):
+                raise NotAvailable(f"{request.title}: {why}")
+            taking = request.operation is SingleOperation.TAKE
+            work = self._context(request.gripper if taking else self._gripper)
+            push = PushToForce(request.force_un)
+            procedure = self._procedure(request, work, push)
+            if taking:
+                self._gripper, self._done = request.gripper, []
+                work.shared.surveyed = False
+            run = self._make_run(procedure, work)
+            self._run = run
+        done = False
+
+        def look() -> None:
+            nonlocal done
+            if not run.over:
+                self._changed.emit()
+            elif not done:
+                done = True
+                self._on_end(request, run, push)
+
+        run.on_change(look)
+        return run
+
+    def _context(self, gripper: str) -> HandlingContext:
+        if gripper not in self.grippers:
+            raise ConfigError(f"there is no gripper {gripper!r}")
+        with self._lock:
+            if gripper not in self._contexts:
+                other = next((each for each in self.grippers if each != gripper), "")
+                settings = self._settings.model_copy(update={"gripper": gripper, "other": other})
+                work = HandlingContext.on(self._rig, settings)
+                if self._contexts:  # fibres are numbered through
+                    work.shared = next(iter(self._contexts.values())).shared
+                self._contexts[gripper] = work
+            return self._contexts[gripper]
+
+    def _procedure(
+        self, request: OperationRequest, work: HandlingContext, push: PushToForce
+    ) -> Procedure[HandlingContext]:
+        operation = request.operation
+        if operation is SingleOperation.TAKE and request.marked is not None:
+            return build_take(work.settings, request.marked)
+        if operation is SingleOperation.PUSH:
+            return build_push(push)
+        if operation is SingleOperation.UNDO:
+            return _UNDO[self._done[-1]]()
+        return _PLAIN[operation]()
+
+    # How it ended
+
+    def _on_end(
+        self,
+        request: OperationRequest,
+        run: ProcedureRun[HandlingContext],
+        push: PushToForce,
+    ) -> None:
+        work = run.work
+        work.shared.unsuitable = []
+        if run.failure is None:
+            values, text = _found(request, work, push)
+            result = OperationResult(request.title, good=True, text=text, values=values)
+            self._note_done(request.operation)
+        else:
+            result = OperationResult(
+                request.title, good=False, text=_failed(run), values=_doubtful(work)
+            )
+        if self.fibre is None:
+            self._done = []
+        self._result = result
+        _forget_moves(self._rig)
+        logger.info("%s: %s", result.title, result.text)
+        self._changed.emit()
+
+    def _note_done(self, operation: SingleOperation) -> None:
+        if operation is SingleOperation.UNDO or (operation in PUSHES and self.last in PUSHES):
+            self._done.pop()  # several pushes are taken back as one: the probe goes away
+        if operation is not SingleOperation.UNDO:
+            self._done.append(operation)
+
+    def close(self) -> None:
+        """Abort what runs, and let go of the force channel; harmless the second time."""
+        run = self._run
+        if run is not None and self.running:
+            run.abort("the platform is closed")
+            run.join()
+        for work in self._contexts.values():
+            work.close()
+
+
+UNDO_WORDS: Final[Mapping[SingleOperation, str]] = {
+    SingleOperation.TAKE: "The fibre is laid where it was taken from.",
+    SingleOperation.BRING: "The probe draws back, then the fibre is carried back.",
+    SingleOperation.PUSH: "The probe draws back from the fibre; nothing else moves.",
+    SingleOperation.MEASURE: "The probe draws back from the fibre; nothing else moves.",
+}
+_UNDO: Final[Mapping[SingleOperation, Callable[[], Procedure[HandlingContext]]]] = {
+    SingleOperation.TAKE: build_lay_back,
+    SingleOperation.BRING: build_carry_back,
+    SingleOperation.PUSH: build_retract,
+    SingleOperation.MEASURE: build_retract,
+}
+_PLAIN: Final[Mapping[SingleOperation, Callable[[], Procedure[HandlingContext]]]] = {
+    SingleOperation.BRING: build_bring,
+    SingleOperation.MEASURE: build_measure,
+    SingleOperation.PUT_AWAY: build_put_away,
+}
+
+Values = tuple[tuple[str, str], ...]
+
+
+def _forget_moves(rig: Applications) -> None:
+    """Have Undo of movements begin anew: what an operation did is taken back by operations.
+
+    One movement of an operation taken back alone could lead the probe into the fibre.
+    """
+    application = rig.mico.application
+    if isinstance(application, MicoApplication):
+        application.undo.forget_all()
+
+
+def _failed(run: ProcedureRun[HandlingContext]) -> str:
+    failure = run.failure
+    stopped = isinstance(failure, ProcedureStopped)
+    text = str(failure)
+    if run.not_safe and not stopped:
+        text = f"{text}; not made safe: {run.not_safe}"
+    return text
+
+
+def _found(
+    request: OperationRequest, work: HandlingContext, push: PushToForce
+) -> tuple[Values, str]:
+    fibre, operation = work.fibre, request.operation
+    if fibre is None:
+        gone = "laid back" if operation is SingleOperation.UNDO else "put away"
+        return (), f"The fibre is {gone}; {work.settings.gripper} is empty."
+    if operation is SingleOperation.TAKE:
+        return _size(fibre), f"{work.settings.gripper} holds fibre {fibre.number}."
+    if operation is SingleOperation.BRING:
+        return (("free length", f"{fibre.free_um:.0f} µm"),), "The fibre is before the probe."
+    if operation is SingleOperation.PUSH and push.pushed is not None:
+        return _pushed(push), f"The fibre pushed back with {push.pushed.force_un:.1f} µN."
+    if operation is SingleOperation.MEASURE and fibre.bending is not None:
+        return _stiffness(fibre.bending), "The bending stiffness is measured."
+    return (), f"Taken back; {work.settings.gripper} still holds the fibre."
+
+
+def _size(fibre: HeldFibre) -> Values:
+    return (
+        ("length", f"{with_interval(fibre.length_um, fibre.length_std_um)} µm"),
+        ("width", f"{with_interval(fibre.width_um, fibre.width_std_um, 1)} µm"),
+        ("curl", with_interval(fibre.curl, fibre.curl_std, 3)),
+    )
+
+
+def _pushed(push: PushToForce) -> Values:
+    found = push.pushed
+    if found is None:
+        return ()
+    return (
+        ("force (noise)", f"{with_interval(found.force_un, found.force_std_un, 2)} µN"),
+        ("bend", f"{found.bend_um:.1f} µm, span {found.span_um:.0f} µm"),
+        ("stiffness", f"{with_interval(found.fit.k_un_um, found.fit.k_std_un_um, 2)} µN/µm"),
+    )
+
+
+def _stiffness(result: BendingResult) -> Values:
+    if not math.isfinite(result.ei_n_m2):
+        return ()
+    bounds = interval(result.ei_low_n_m2, result.ei_high_n_m2)
+    return (("EI", f"{stiffness(result.ei_n_m2)} ({bounds}, 95 %) {EI_LABEL}"),)
+
+
+def _doubtful(work: HandlingContext) -> Values:
+    fibre = work.fibre
+    if fibre is None or fibre.bending is None or fibre.bending.trusted:
+        return ()
+    return tuple((f"{name}, not trusted", value) for name, value in _stiffness(fibre.bending))

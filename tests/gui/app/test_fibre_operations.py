@@ -1,0 +1,215 @@
+"""Operations on a fibre from the picture: found, right-clicked, taken, bent, put away."""
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QAction, QContextMenuEvent
+from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QMenu, QPushButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from cosmic.app.panels.operation_card import OperationCard
+from cosmic.app.platform import build_platform
+from cosmic.app.windows.fibre_menu import FibreOperations
+from cosmic.app.windows.operator_window import OperatorWindow
+from cosmic.app.windows.tasks import HANDLE, MEASURE, TaskLayout
+from cosmic.daqco.gui.main_widget import make_daqco_gui
+from cosmic.frame.gui.theme import State
+from cosmic.mico.gui.mico_widget import make_mico_gui
+from cosmic.twin.truth import read_truth
+from cosmic.vico.gui.vico_gui import make_vico_gui
+from gui.app.windows import Make
+
+LEFT = Qt.MouseButton.LeftButton
+LONG_MS = 120_000
+
+
+def tasks(window: OperatorWindow) -> TaskLayout:
+    assert window.tasks is not None
+    return window.tasks
+
+
+def operations(window: OperatorWindow) -> FibreOperations:
+    found = tasks(window).operations
+    assert found is not None
+    return found
+
+
+class Hand:
+    """Clicks, and counts what it does."""
+
+    def __init__(self, window: OperatorWindow, qtbot: QtBot) -> None:
+        self.count = 0
+        self._window, self._qtbot = window, qtbot
+
+    def click(self, widget: QWidget) -> None:
+        self._qtbot.waitUntil(lambda: widget.isVisible() and widget.isEnabled())
+        self.count += 1
+        self._qtbot.mouseClick(widget, LEFT)
+
+    def menu_at(self, pixel: tuple[float, float]) -> dict[str, QAction]:
+        """Right-click a pixel of the image, and return what the menu offers."""
+        self.count += 1
+        view = tasks(self._window).stage.camera.view
+        point = view.to_screen.map(QPointF(*pixel)).toPoint()
+        QApplication.sendEvent(
+            view.viewport(),
+            QContextMenuEvent(QContextMenuEvent.Reason.Mouse, point, view.mapToGlobal(point)),
+        )
+        shown = [each for each in QApplication.topLevelWidgets() if isinstance(each, QMenu)]
+        menu = next(each for each in shown if each.isVisible())
+        self._menu = menu
+        return {each.text(): each for each in menu.actions() if each.text()}
+
+    def choose(self, action: QAction) -> None:
+        """Point at an entry of the menu and click it."""
+        self.count += 1
+        action.hover()
+        assert action.isEnabled(), action.toolTip()
+        place = self._menu.actionGeometry(action).center()
+        self._qtbot.mouseClick(self._menu, LEFT, pos=place)
+
+    def enter(self, field: QLineEdit, text: str) -> None:
+        self.count += 1
+        self._window.activateWindow()
+        self._qtbot.waitUntil(self._window.isActiveWindow)
+        field.setFocus()  # else the letters are keys that jog
+        field.selectAll()
+        self._qtbot.keyClicks(field, text)
+
+
+def with_fibres(make: Make, qtbot: QtBot, truth: Path | None = None) -> OperatorWindow:
+    """Open a window over three dry fibres, and wait for the image."""
+    platform = build_platform(
+        None,
+        applications=("mico", "daqco", "vico"),
+        rate=8.0,
+        sample="three-dry",
+        truth=truth,
+        mico_gui=make_mico_gui,
+        daqco_gui=make_daqco_gui,
+        vico_gui=make_vico_gui,
+    )
+    window = make(platform, size=(1366, 768))
+    assert window.workspaces is not None
+    window.workspaces.choose(HANDLE)
+    view = tasks(window).stage.camera.view
+    qtbot.waitUntil(lambda: view.image is not None, timeout=15_000)
+    return window
+
+
+def fibre_px(window: OperatorWindow, qtbot: QtBot) -> tuple[float, float]:
+    """Wait until a fibre is found, and return the middle of the longest that is certain."""
+    camera = tasks(window).stage.camera.camera
+
+    def found() -> bool:
+        seen = camera.analysis
+        return seen is not None and any(each.certain for each in seen.fibres)
+
+    qtbot.waitUntil(found, timeout=15_000)
+    seen = camera.analysis
+    assert seen is not None
+    fibre = max((each for each in seen.fibres if each.certain), key=lambda each: each.length_px)
+    x, y = fibre.centre_line_px[len(fibre.centre_line_px) // 2]
+    return float(x), float(y)
+
+
+def coach_button(window: OperatorWindow) -> QPushButton:
+    found = window.findChild(QPushButton, "coachButton")
+    assert isinstance(found, QPushButton)
+    return found
+
+
+def done(window: OperatorWindow, qtbot: QtBot, title: str) -> OperationCard:
+    """Wait until an operation has ended well, and its card says so."""
+    card = operations(window).card
+    qtbot.waitUntil(
+        lambda: card.badge.state is not State.BUSY and not operations(window).running,
+        timeout=LONG_MS,
+    )
+    assert card.title.toolTip() == title, card.line.text()
+    assert card.badge.state is State.OK, card.line.text()
+    return card
+
+
+def test_what_cannot_be_done_with_a_fibre_says_why_and_moves_nothing(
+    make: Make, qtbot: QtBot
+) -> None:
+    window = with_fibres(make, qtbot)
+    hand = Hand(window, qtbot)
+    assert window.platform.mico is not None
+    manager = window.platform.mico.manager
+    before = {name: each.position for name, each in manager.states().items()}
+    menu = hand.menu_at((10.0, 10.0))
+    assert "no fibre is marked" in menu["Take with left"].toolTip()
+    assert "take one first" in menu["Bring to the probe"].toolTip()
+    assert not menu["Put away"].isEnabled()
+    hand.choose(menu["Find fibres"])
+    pixel = fibre_px(window, qtbot)
+    menu = hand.menu_at(pixel)
+    view = tasks(window).stage.camera
+    menu["Take with left"].hover()
+    assert view.mark.line_px is not None
+    assert "Take with left" in view.message.text
+    assert menu["Take with right"].isEnabled()
+    qtbot.keyClick(QApplication.activePopupWidget(), Qt.Key.Key_Escape)
+    assert view.mark.line_px is None
+    operations(window).push(20.0)
+    card = operations(window).card
+    assert card.badge.state is State.REFUSED
+    assert "take one first" in card.line.text()
+    assert {name: each.position for name, each in manager.states().items()} == before
+
+
+@pytest.mark.slow
+def test_a_fibre_is_picked_up_and_bent_and_recorded_by_fifteen_actions(
+    make: Make, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    truth = tmp_path / "truth.jsonl"
+    window = with_fibres(make, qtbot, truth)
+    monkeypatch.setattr(tasks(window).folder, "_folder", tmp_path)
+    hand = Hand(window, qtbot)
+    coach = coach_button(window)
+    qtbot.waitUntil(lambda: coach.text() in ("Home lens", "Find fibres"))
+    while coach.text() != "Find fibres":
+        hand.click(coach)
+        qtbot.waitUntil(lambda: coach.isVisible() and coach.text() == "Find fibres", timeout=30_000)
+    hand.click(coach)
+    menu = hand.menu_at(fibre_px(window, qtbot))
+    hand.choose(menu["Take with left"])
+    card = done(window, qtbot, "Take with left")
+    assert "±" in card.findChildren(QLabel, "operationValue")[0].text()
+    hand.click(card.next)
+    done(window, qtbot, "Bring to the probe")
+    buttons = window.top_bar.workspaces
+    force = tasks(window).force
+    assert buttons is not None
+    assert force is not None
+    hand.click(buttons.buttons[MEASURE])
+    hand.enter(force.name, "first fibre")
+    hand.click(force.record)
+    hand.click(card.push)
+    done(window, qtbot, "Push to 50 µN")
+    values = [each.text() for each in card.findChildren(QLabel, "operationValue")]
+    assert float(values[0].split(" ")[0]) == pytest.approx(50.0, abs=1.5)
+    assert "±" in values[0]
+    hand.click(force.record)
+    assert hand.count <= 15
+    qtbot.waitUntil(lambda: "written" in force.message.text())
+
+    assert window.platform.mico is not None
+    collision = window.platform.mico.collision
+    assert collision is not None
+    for _ in range(3):  # the push, the way to the probe, the grasp
+        qtbot.waitUntil(card.undo.isVisible)
+        hand.click(card.undo)
+        done(window, qtbot, "Undo")
+        assert collision.allowed_contacts == frozenset()
+    assert operations(window).handling.held_by == ""
+    window.close()
+    record = read_truth(truth)
+    jaws = {"left_jaw_a", "left_jaw_b", "plate"}
+    pairs = {frozenset(each.facts["bodies"]) for each in record.of("contact")}
+    assert {pair for pair in pairs if not pair <= jaws} == set()
+    assert len({each.facts["fibre"] for each in record.of("grasped")}) == 1
+    assert record.of("released")
