@@ -139,20 +139,39 @@ class PlatformTransform(CoordinateTransform):
 
     @override
     def move_to(self, image: CameraImage, point_px: Pixel, what: str) -> str:
-        tool = self._tool(what)
         running = self._vico.running_task
         if running is not None and not running.done:
             raise NotAvailable(
                 f"{running.title} is running; wait until it has ended, then click again"
             )
-        tip = tip_um(tool, self.positions())
-        if tip is None:
-            raise NotAvailable(f"{what}: its position is unknown; initialise the platform")
-        x_um, y_um = self.map_of(image, tip[2], what).to_um(point_px).tolist()
-        motions = self._reaching(tool, (x_um, y_um, tip[2]))
+        tool = self._tool(what)
+        x_um, y_um, z_um = self._point_um(image, point_px, tool)
+        motions = self._reaching(tool, (x_um, y_um, z_um))
         self._mico.begin_together(motions, source=SOURCE)
         logger.info("click: %s to %.1f, %.1f um", what, x_um, y_um)
         return f"{tool.shown} moves to x {x_um:.1f}, y {y_um:.1f} µm"
+
+    def motions_to(self, image: CameraImage, point_px: Pixel, what: str) -> dict[str, SentMotion]:
+        """Return what would bring a tool to a pixel, at its height; nothing moves.
+
+        Raises
+        ------
+        MoveRefused
+            The point cannot be reached.
+        NotAvailable
+            It cannot be told where that is.
+        """
+        tool = self._tool(what)
+        return self._reaching(tool, self._point_um(image, point_px, tool))
+
+    def _point_um(
+        self, image: CameraImage, point_px: Pixel, tool: ToolSettings
+    ) -> tuple[float, float, float]:
+        tip = tip_um(tool, self.positions())
+        if tip is None:
+            raise NotAvailable(f"{tool.name}: its position is unknown; initialise the platform")
+        x_um, y_um = self.map_of(image, tip[2], tool.name).to_um(point_px).tolist()
+        return x_um, y_um, tip[2]
 
     def _reaching(
         self, tool: ToolSettings, point_um: tuple[float, float, float]

@@ -3,7 +3,8 @@
 from math import dist
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QApplication
 
 from cosmic.vico.hw.interface import Roi
@@ -174,3 +175,49 @@ def test_nothing_moves_while_the_choice_is_open(qtbot, shown, mouse, camera):
     qtbot.keyClick(shown.row.menu, Qt.Key.Key_Escape)
     mouse.click((700, 400))
     assert camera.calls == []
+
+
+def test_a_drag_aims_and_the_tool_moves_to_where_the_button_is_let_go(
+    qtbot, shown, mouse, camera
+) -> None:
+    camera.change(calibration_problem="")
+    qtbot.waitUntil(shown.row.go.isEnabled)
+    choose_target(qtbot, shown, "right gripper")
+    aimed: list[object] = []
+    shown.tools.aimed.connect(lambda point, what: aimed.append((point, what)))
+    mouse.drag((100.0, 100.0), (300.0, 200.0))
+    points = [point for point, what in aimed if point is not None]
+    assert points[0] == pytest.approx((100.0, 100.0), abs=1.0)
+    assert points[-1] == pytest.approx((300.0, 200.0), abs=1.0)
+    assert aimed[-1][0] is None
+    ((_, place, what),) = camera.calls
+    assert (place, what) == (pytest.approx((300.0, 200.0), abs=1.0), "right gripper")
+
+
+def test_the_wheel_with_ctrl_changes_the_height_and_not_the_zoom(qtbot, shown, camera) -> None:
+    camera.change(calibration_problem="")
+    qtbot.waitUntil(shown.row.go.isEnabled)
+    notches: list[int] = []
+    shown.view.height_wheeled.connect(notches.append)
+
+    def wheel(modifier: Qt.KeyboardModifier) -> None:
+        middle = QPointF(shown.view.rect().center())
+        event = QWheelEvent(
+            middle,
+            QPointF(shown.view.mapToGlobal(middle.toPoint())),
+            QPoint(),
+            QPoint(0, 120),
+            Qt.MouseButton.NoButton,
+            modifier,
+            Qt.ScrollPhase.NoScrollPhase,
+            False,
+        )
+        QApplication.sendEvent(shown.view.viewport(), event)
+
+    wheel(Qt.KeyboardModifier.ControlModifier)
+    assert notches == [], "no tool is chosen: the wheel zooms"
+    zoom = shown.view.zoom
+    choose_target(qtbot, shown, "right gripper")
+    wheel(Qt.KeyboardModifier.ControlModifier)
+    assert notches == [1]
+    assert shown.view.zoom == zoom

@@ -110,12 +110,12 @@ class OperationCard(QFrame):
         for number in range(_MOST_VALUES):
             pair = QLabel(), named(QLabel(), "operationValue")
             pair[1].setFont(number_font(bold=True))
-            for column, label in enumerate(pair):
-                grid.addWidget(label, number, column)
+            for place, label in enumerate(pair):
+                grid.addWidget(label, number, place)
             self._values.append(pair)
         foot, row = tight_row(STEP_PX // 2)
-        for widget in (self.next, self.force, self.push, self.undo):
-            row.addWidget(widget)
+        for each in (self.next, self.force, self.push, self.undo):
+            row.addWidget(each)
         self._foot = foot
         column = QVBoxLayout(self)
         column.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX // 2)

@@ -241,7 +241,7 @@ class PathController(QObject):
             self._refuse(request, f"{request.axis} is moving; wait until it is stationary")
             return
         try:
-            task = self._application.search_path({request.axis: request.target})
+            task = self._application.search_path({request.axis: request.target, **request.others})
         except NotAvailable as exc:
             self._refuse(request, str(exc))
             return

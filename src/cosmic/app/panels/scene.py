@@ -80,9 +80,13 @@ class ScenePanel(QWidget):
     -------
     refused_gone()
         The refused movement was taken out of the image.
+    aimed(object), placed(object)
+        The lines of sight on which a tool is aimed and placed, while `set_moving` is on.
     """
 
     refused_gone = Signal()
+    aimed = Signal(object)
+    placed = Signal(object)
 
     def __init__(
         self, panel: MicoWidget, settings: QSettings, parent: QWidget | None = None
@@ -103,6 +107,7 @@ class ScenePanel(QWidget):
         self._replayed = False
         self._movements = Relay(self._on_movement).follow(self._mico.follow_movements)
         self._compact = False
+        self._moving = False
         self._feed = StateFeed(self._mico, self, period_ms=PERIOD_MS)
         self._feed.set_paused(True)
         self._wait = named(QLabel("The scene is loading"), "sceneWait")
@@ -161,6 +166,9 @@ class ScenePanel(QWidget):
         if words is not None:
             words.clicked.connect(self.clear_refused)
         scene.refused_cleared.connect(self._on_refused_cleared)
+        scene.aimed.connect(self.aimed)
+        scene.placed.connect(self.placed)
+        scene.set_moving(self._moving)
         self._show_all()
 
     def set_compact(self, compact: bool) -> None:
@@ -170,6 +178,17 @@ class ScenePanel(QWidget):
         self.setMinimumSize(least, 9 * STEP_PX if compact else least)
         if self._scene is not None:
             self._scene.set_compact(compact)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the left button aims a tool."""
+        return self._moving
+
+    def set_moving(self, on: bool) -> None:
+        """Have the left button aim a tool, or turn what is seen."""
+        self._moving = on
+        if self._scene is not None:
+            self._scene.set_moving(on)
 
     def _stored(self) -> dict[str, object]:
         try:

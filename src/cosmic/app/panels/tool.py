@@ -42,13 +42,13 @@ USUAL_STEP_DEG: Final = 1.0
 SAFE_SIDE: Final = 0.1
 """How far before the place that a refusal names an axis is sent, in its unit."""
 _DIRECTIONS: Final = ("x", "y", "z")
-_PLACES: Final = {("x", -1): (1, 0), ("x", 1): (1, 2), ("y", 1): (0, 1), ("y", -1): (2, 1)}
+_PLACES: Final = {"left": (1, 0), "right": (1, 2), "up": (0, 1), "down": (2, 1)}
 _Z_PLACES: Final = {1: (0, 3), -1: (2, 3)}
+_ARROWS: Final = {"left": "←", "right": "→", "up": "↑", "down": "↓"}
+Shown = Mapping[tuple[str, int], str]
+"""Where on the picture a part of a tool goes, forwards (1) or backwards (-1): "left", "up", ..."""
+USUAL: Final[Shown] = {("x", -1): "left", ("x", 1): "right", ("y", 1): "up", ("y", -1): "down"}
 _SIGNS: Final = {
-    ("x", -1): "←",
-    ("x", 1): "→",
-    ("y", 1): "↑",
-    ("y", -1): "↓",
     ("z", 1): "⤒",
     ("z", -1): "⤓",
     ("rotation", 1): "↺",
@@ -145,6 +145,8 @@ class ToolPanel(QWidget):
         self._stopped = ""
         self._verdict: MoveVerdict | None = None
         self._last: tuple[str, Callable[[], None]] | None = None
+        self._shown: Shown = USUAL
+        self._detour_by_click: Callable[[], None] | None = None
         self._feed = StateFeed(self._mico, self)
         self._relay = Relay(self._on_progressed)
         self._make_widgets()
@@ -292,24 +294,35 @@ class ToolPanel(QWidget):
                 continue
             for direction in (-1, 1):
                 button = self._pad_button(part, name, direction)
-                place = _PLACES.get((part, direction))
-                if part == "z":
-                    place = _Z_PLACES[direction]
-                elif place is None:
-                    place = (1, 0) if direction > 0 else (1, 2)
-                grid.addWidget(button, *place)
+                grid.addWidget(button, *self._pad_place(part, direction))
                 self.pad[part, direction] = button
         return pad
+
+    def _pad_place(self, part: str, direction: int) -> tuple[int, int]:
+        if part == "z":
+            return _Z_PLACES[direction]
+        shown = self._shown.get((part, direction))
+        if shown is not None:
+            return _PLACES[shown]
+        return (1, 0) if direction > 0 else (1, 2)
+
+    def show_directions(self, shown: Shown) -> None:
+        """Have the pad point as the picture shows it; where nothing is calibrated, as usual."""
+        if dict(shown) != dict(self._shown):
+            self._shown = dict(shown)
+            self._build_tool()
 
     def _pad_button(self, part: str, name: str, direction: int) -> QPushButton:
         settings = self._gui.cards[name].settings
         text = settings.forward_text if direction > 0 else settings.backward_text
         key = key_text(settings.forward_key if direction > 0 else settings.backward_key)
-        sign = _SIGNS.get((part, direction), text)
+        shown = self._shown.get((part, direction))
+        sign = _ARROWS[shown] if shown else _SIGNS.get((part, direction), text)
+        where = f", {shown} in the picture" if shown else ""
         held = f"; hold the key {key} to move on and on" if key else ""
         short = key if len(key) == 1 else ""
         button = named(push_button(f"{sign} {short}".strip(), ""), "padButton")
-        tipped(button, f"Move {name} {text} by the step{held}")
+        tipped(button, f"Move {name} {text}{where} by the step{held}")
         button.setAccessibleName(f"{name} {text}")
         button.clicked.connect(lambda: self.move_once(name, direction))
         return button
@@ -401,7 +414,7 @@ class ToolPanel(QWidget):
         card = self._gui.cards.get(name)
         if card is None or not self.step.commit():
             return
-        self._say("")
+        self.say("")
         self._last = (name, lambda: self.move_once(name, direction))
         axis, amount = card.axis, self.step.value()
         self._steps[self._unit] = amount
@@ -443,7 +456,7 @@ class ToolPanel(QWidget):
         row, card = self._rows[name], self._gui.cards.get(name)
         if card is None or not row.target.commit():
             return
-        self._say("")
+        self.say("")
         self._last = (name, lambda: self.move_to_target(name))
         there = row.target.value()
         card.commands.issue(
@@ -466,7 +479,7 @@ class ToolPanel(QWidget):
         if len(wanted) == 1:
             self.move_to_target(next(iter(wanted)))
         elif wanted:
-            self._say("")
+            self.say("")
             try:
                 self._mico.move(wanted, wait=False)
             except CosmicError as exc:
@@ -495,7 +508,7 @@ class ToolPanel(QWidget):
         except CosmicError as exc:
             self._refuse(str(exc))
             return
-        self._say("")
+        self.say("")
         task.subscribe(self._relay)
 
     def _on_progressed(self, progress: Progress) -> None:
@@ -517,16 +530,17 @@ class ToolPanel(QWidget):
         self.pose_name.hide()
         self.refresh_poses()
         self.poses.setCurrentText(name)
-        self._say(f"Pose {name} kept")
+        self.say(f"Pose {name} kept")
 
     # What is said
 
     def show_stopped(self, reason: str | None) -> None:
         """Show that the stop is latched, and why; None: no longer."""
         self._stopped = f"■ STOPPED: {reason}; Reset allows movements again" if reason else ""
-        self._say("")
+        self.say("")
 
-    def _say(self, text: str) -> None:
+    def say(self, text: str) -> None:
+        """Say one line below the tool; what a refusal offered is gone. Empty takes it away."""
         shown = self._stopped or text
         for button in (self.nearest, self.detour):
             button.hide()
@@ -535,13 +549,13 @@ class ToolPanel(QWidget):
 
     def _refuse(self, reason: str) -> None:
         look = state_look(State.REFUSED)
-        self._say(f"{look.glyph} {reason}")
+        self.say(f"{look.glyph} {reason}")
 
     def _on_refused(self, verdict: MoveVerdict) -> None:
         if verdict.axis and verdict.axis not in self.axes:
             return
         self._refuse(str(verdict))
-        self._verdict = verdict
+        self._verdict, self._detour_by_click = verdict, None
         reachable = verdict.limit is not None and bool(verdict.axis)
         if reachable and verdict.limit is not None:
             self.nearest.setText(f"Go to {verdict.limit:.0f}")
@@ -559,15 +573,24 @@ class ToolPanel(QWidget):
         here = state.position if state.position is not None else 0.0
         back = math.copysign(min(SAFE_SIDE, abs(verdict.limit - here)), here - verdict.limit)
         there = verdict.limit + back - state.zero
-        self._say("")
+        self.say("")
         card.commands.issue(
             "move to a position",
             lambda consent: card.axis.move_to(there, wait=False, consent=consent),
             goal=self._goal(state, there),
         )
 
+    def offer_detour(self, begin: Callable[[], None]) -> None:
+        """Offer to plan a path to where a click led that was refused."""
+        self._detour_by_click = begin
+        self.detour.show()
+
     def _on_detour(self) -> None:
         """Have a path planned to where the refused command led; it is shown before it is driven."""
+        begin, self._detour_by_click = self._detour_by_click, None
+        if begin is not None:
+            begin()
+            return
         if self._last is None or self._last[0] not in self._gui.cards:
             return
         name, again = self._last
@@ -578,7 +601,7 @@ class ToolPanel(QWidget):
 
     def _on_said(self, text: str, state: object) -> None:
         glyph = state_look(state).glyph if isinstance(state, State) else ""
-        self._say(f"{glyph} {text}".strip())
+        self.say(f"{glyph} {text}".strip())
 
     def _on_undo_available(self, what: str) -> None:
         self.undo.setEnabled(bool(what))

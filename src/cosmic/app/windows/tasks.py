@@ -23,7 +23,8 @@ from cosmic.app.results.session_log import SessionLog
 from cosmic.app.results.sessions import SessionFolder
 from cosmic.app.rig import Rig
 from cosmic.app.windows.fibre_menu import FibreOperations
-from cosmic.app.windows.stage import Stage, column_of
+from cosmic.app.windows.picture_move import PictureMove
+from cosmic.app.windows.stage import SCENE_TITLE, Stage, column_of
 from cosmic.frame.failure import Failure
 from cosmic.frame.gui.clearance_meter import closeness
 from cosmic.frame.gui.server_gui import CosmicServerGui
@@ -150,12 +151,14 @@ class TaskLayout(QObject):
         cameras = {view.windowTitle(): view for view in images.cameras.values()}
         self._parts = {title: view.give_parts() for title, view in cameras.items()}
         self.stage = Stage(cameras, scene)
+        self._scene = scene
         self.bar = ImageBar(rig.vico, {title: each.exposure for title, each in self._parts.items()})
         self.stage.set_bar(self.bar)
         self.tool = ToolPanel(gui)
+        views = list(cameras.values())
+        self._picture_move = PictureMove(rig, gui, self.tool, scene, views, self)
         self.operations: FibreOperations | None = None
         if can_run(platform):
-            views = list(cameras.values())
             self.operations = FibreOperations(rig, self.stage, scene, views, self)
         self.force = ForcePanel(rig.daqco, gui, self.folder) if instruments.force else None
         self.results = ResultsPanel(self._folders, platform.policy, self._model)
@@ -239,10 +242,11 @@ class TaskLayout(QObject):
     # Reactions
 
     def _on_move_toggled(self, on: bool) -> None:
-        """Have the next clicks on the image move the chosen tool, until that is put away."""
-        view = self.stage.camera
-        if on:
-            view.row.target_chosen.emit(self.tool.tool.name)
+        """Have the mouse move the chosen tool in both pictures, until that is put away."""
+        view, name = self.stage.camera, self.tool.tool.name
+        self._scene.set_moving(on)
+        if on and not view.camera.calibration_problem and name in view.camera.targets:
+            view.row.target_chosen.emit(name)
         else:
             view.tools.put_away()
         self._show_move()
@@ -257,10 +261,14 @@ class TaskLayout(QObject):
 
     def _show_move(self) -> None:
         view, name = self.stage.camera, self.tool.tool.name
-        problem = view.camera.calibration_problem
+        in_scene = self.stage.large == SCENE_TITLE
+        problem = "" if in_scene else view.camera.calibration_problem
         if not problem and name not in view.camera.targets:
             problem = f"the {name} is no tool that the image knows"
-        self.bar.show_move(problem, name, on=bool(view.tools.target))
+        on = self._scene.moving if in_scene else bool(view.tools.target)
+        if not in_scene and not on:
+            self._scene.set_moving(False)  # Escape has put the tool away
+        self.bar.show_move(problem, name, on=on)
 
     def _on_large_changed(self, title: str) -> None:
         if title in self._columns:
@@ -320,6 +328,7 @@ class TaskLayout(QObject):
     def watch(self) -> None:
         """Look at what raises alarms and is not told by itself."""
         self._show_move()
+        self._picture_move.show_directions(self.stage.camera)
         self._watch_clearance()
         if self.force is None:
             return

@@ -162,9 +162,7 @@ class FibreHandling:
         self._rig, self._make_run, self._busy = rig, make_run, busy
         self._settings = settings or HandlingSettings()
         tools = {each.name: each for each in vision_of(rig.vico).settings.tool}
-        self.grippers: tuple[str, ...] = tuple(
-            name for name in GRIPPERS if name in tools and tools[name].gap_axis
-        )
+        self._grippers = tuple(name for name in GRIPPERS if name in tools and tools[name].gap_axis)
         self._contexts: dict[str, HandlingContext] = {}
         self._lock = RLock()
         self._gripper = ""
@@ -178,6 +176,11 @@ class FibreHandling:
         return f"<FibreHandling, {self.held_by or 'no gripper'} holds a fibre>"
 
     # What is known
+
+    @property
+    def grippers(self) -> tuple[str, ...]:
+        """Names of the grippers that can take a fibre."""
+        return self._grippers
 
     @property
     def run(self) -> ProcedureRun[HandlingContext] | None:

@@ -1,7 +1,7 @@
 """A movement of the window that something stands in the way of (ECM, thesis 3.4.2)."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import MoveVerdict
@@ -28,6 +28,8 @@ class DetourRequest:
         Shows a line on the card of the axis; empty takes it away.
     refuse : callable
         Refuses the movement after all, at the field it came from.
+    others : mapping of str to float
+        Targets of further axes that move with it.
     """
 
     axis: str
@@ -36,6 +38,7 @@ class DetourRequest:
     verdict: MoveVerdict
     note: Callable[[str], None]
     refuse: Callable[[MoveVerdict], None]
+    others: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

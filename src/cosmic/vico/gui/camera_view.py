@@ -23,6 +23,7 @@ from cosmic.vico.gui.calibrate_menu import CalibrateButton
 from cosmic.vico.gui.camera_chooser import CameraChooser
 from cosmic.vico.gui.chain_panel import ChainPanel
 from cosmic.vico.gui.contrast_panel import ContrastPanel
+from cosmic.vico.gui.ghost_layer import GhostLayer
 from cosmic.vico.gui.image_tools import ImageTools
 from cosmic.vico.gui.image_view import CameraImageView
 from cosmic.vico.gui.layers import CornerText, Crosshair, Note, ScaleBar
@@ -108,6 +109,7 @@ class CameraView(QWidget):
         self.view = CameraImageView()
         self.cross, self.scale_bar = Crosshair(), ScaleBar()
         self.seen, self.mark, self.note = SeenLayer(), MarkLayer(), Note()
+        self.ghost = GhostLayer()
         self.row, self.status = ToolRow(), StatusRow(self._camera)
         self.calibrate = self.row.add(CalibrateButton(self._camera))
         self.contrast, self.chain = ContrastPanel(), ChainPanel(self._camera)

@@ -3,7 +3,7 @@
 from PySide6.QtCore import QObject, QPointF, Signal
 from PySide6.QtWidgets import QMenu
 
-from cosmic.frame.errors import CosmicError
+from cosmic.frame.errors import CosmicError, MoveRefused
 from cosmic.frame.gui.theme import State, state_look
 from cosmic.vico.api.camera import CameraHandle
 from cosmic.vico.api.coordinate_transform import Pixel
@@ -22,12 +22,18 @@ class ImageTools(QObject):
         One line for the operator: what was begun, or why not.
     region_chosen(int, int, int, int)
         x, y, width and height of the part to be read, in pixels of the image shown.
+    aimed(object, str)
+        A pixel is pointed at to which a click would move that tool; None: no longer.
+    refused(object, object, str)
+        The verdict on a click, its pixel, and the tool.
     menu_made(QMenu, object)
         The menu of the right button is about to be shown, for whoever has more to offer; and the
         pixel that was clicked.
     """
 
     message = Signal(str)
+    aimed = Signal(object, str)
+    refused = Signal(object, object, str)
     menu_made = Signal(QMenu, object)
     region_chosen = Signal(int, int, int, int)
 
@@ -51,6 +57,7 @@ class ImageTools(QObject):
         view.cancel_requested.connect(self.put_away)
         view.menu_requested.connect(self._on_menu)
         self._click.clicked.connect(self._on_clicked)
+        self._click.aimed.connect(lambda point_px: self.aimed.emit(point_px, self._target))
         self._roi.chosen.connect(self._on_region)
 
     def _scale(self) -> float | None:
@@ -82,7 +89,9 @@ class ImageTools(QObject):
     def _on_target(self, target: str) -> None:
         self._view.set_tool(self._click)
         self._target = target
-        self.message.emit(f"click where {target} is to go; press Esc to cancel")
+        self.message.emit(
+            f"click or drag to where {target} is to go; Ctrl+wheel changes its height; Esc ends"
+        )
 
     def _on_clicked(self, point_px: Pixel) -> None:
         if not self._view.is_inside(point_px):
@@ -90,6 +99,9 @@ class ImageTools(QObject):
             return
         try:
             self.message.emit(self._camera.click_to_move(point_px, self._target))
+        except MoveRefused as exc:
+            self._refuse(str(exc))
+            self.refused.emit(exc.verdict, point_px, self._target)
         except CosmicError as exc:
             self._refuse(str(exc))
 

@@ -15,6 +15,7 @@ from PySide6.QtGui import (
     QPainter,
     QResizeEvent,
     QTransform,
+    QWheelEvent,
 )
 from PySide6.QtWidgets import QToolTip, QWidget
 
@@ -34,6 +35,8 @@ from cosmic.vico.gui.levels import (
 from cosmic.vico.hw.interface import Pixels
 
 _PLAIN = Levels(0.0, 255.0)
+_NOTCH = 120
+"""Of a wheel, in Qt's eighths of a degree."""
 
 
 class CameraImageItem:
@@ -154,6 +157,8 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
         Delete and Escape were pressed.
     menu_requested(QPointF)
         The right button was clicked there, on the screen.
+    height_wheeled(int)
+        The wheel was turned with Ctrl while a tool is chosen: notches up, or down.
     """
 
     pointed = Signal(object)
@@ -161,6 +166,7 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
     delete_requested = Signal()
     cancel_requested = Signal()
     menu_requested = Signal(QPointF)
+    height_wheeled = Signal(int)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent, useOpenGL=False, background=None)
@@ -169,6 +175,7 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
         self.tool: Tool | None = None
         self.image: CameraImage | None = None
         self._fitted = True
+        self._wheeled = 0
         self._pixels = CameraImageItem()
         self.box = pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False, defaultPadding=0)
         self.box.disableAutoRange()
@@ -356,6 +363,19 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
             self._with_tool(self.tool.release, event)
         else:
             super().mouseReleaseEvent(event)
+
+    @override
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        held = bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier)
+        if self.tool is None or not held:
+            super().wheelEvent(event)
+            return
+        self._wheeled += event.angleDelta().y()
+        notches = int(self._wheeled / _NOTCH)
+        if notches:
+            self._wheeled -= notches * _NOTCH
+            self.height_wheeled.emit(notches)
+        event.accept()
 
     @override
     def leaveEvent(self, event: QEvent) -> None:

@@ -159,29 +159,42 @@ class RoiLayer(Layer):
 
 
 class ClickTool(QObject):
-    """One click: a point.
+    """A click, or a drag: the point where the button is let go.
 
     Signals
     -------
+    aimed(object)
+        The pixel that is pointed at with the button down, x and y; None: no longer.
     clicked(object)
-        The pixel, x and y.
+        The pixel where the button was let go.
     """
 
+    aimed = Signal(object)
     clicked = Signal(object)
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         self.cursor = Qt.CursorShape.PointingHandCursor
+        self._down = False
 
     def press(self, point_px: Pixel) -> None:
-        """Tell the point."""
-        self.clicked.emit(point_px)
+        """Begin to aim."""
+        self._down = True
+        self.aimed.emit(point_px)
 
     def move(self, point_px: Pixel) -> None:
-        """Do nothing: only the click counts."""
+        """Aim at another point."""
+        if self._down:
+            self.aimed.emit(point_px)
 
     def release(self, point_px: Pixel) -> None:
-        """Do nothing: the press was the click."""
+        """Tell the point."""
+        if self._down:
+            self.cancel()
+            self.clicked.emit(point_px)
 
     def cancel(self) -> None:
-        """Do nothing: nothing is half done."""
+        """Aim no longer; nothing was told."""
+        if self._down:
+            self._down = False
+            self.aimed.emit(None)

@@ -160,10 +160,12 @@ class GLSceneView(SceneView):
 
     @override
     def body_at(self, place: QPointF) -> str:
-        origin, direction = self._camera.ray(place.x(), place.y(), self.width(), self.height())
-        return pick(
-            self.content.meshes, self.content.poses, Ray(origin, direction), self.content.hidden
-        )
+        content = self.content
+        return pick(content.meshes, content.poses, self.ray_at(place), content.hidden)
+
+    @override
+    def ray_at(self, place: QPointF) -> Ray:
+        return Ray(*self._camera.ray(place.x(), place.y(), self.width(), self.height()))
 
     @override
     def drag(self, before: QPointF, now: QPointF, *, turn: bool) -> None:

@@ -198,6 +198,11 @@ class ProjectionView(SceneView):
         return pick(content.meshes, content.poses, panel.ray(place), content.hidden)
 
     @override
+    def ray_at(self, place: QPointF) -> Ray | None:
+        panel = self._panel_at(place)
+        return None if panel is None else panel.ray(place)
+
+    @override
     def drag(self, before: QPointF, now: QPointF, *, turn: bool) -> None:
         panel = self._panel_at(before)
         if panel is None:

@@ -52,15 +52,20 @@ class SceneWidget(QWidget):
         The body under the cursor; empty when there is none.
     refused_cleared()
         The operator took the refused movement out of the picture.
+    aimed(object), placed(object)
+        See `SceneView`.
     """
 
     hovered = Signal(str)
     refused_cleared = Signal()
+    aimed = Signal(object)
+    placed = Signal(object)
 
     def __init__(self, parent: QWidget | None = None, *, prefer_gl: bool = True) -> None:
         super().__init__(parent)
         self.setObjectName("SceneWidget")
         self._content = SceneContent()
+        self._moving = False
         self._preset = "home"
         self._bodies = BodiesButton()
         self._bodies.hidden_changed.connect(self._on_hidden_changed)
@@ -102,6 +107,11 @@ class SceneWidget(QWidget):
         for each in (self._toolbar, self._nearest):
             each.setVisible(not compact)
 
+    def set_moving(self, on: bool) -> None:
+        """Have the left button aim a tool, or turn what is seen."""
+        self._moving = on
+        self._view.set_moving(on)
+
     def _make_view(self, prefer_gl: bool) -> SceneView:
         view: SceneView
         try:
@@ -110,6 +120,9 @@ class SceneWidget(QWidget):
             logger.info("the scene is shown as projections: %s", exc)
             view = ProjectionView(self._content, str(exc))
         view.hovered.connect(self.hovered)
+        view.aimed.connect(self.aimed)
+        view.placed.connect(self.placed)
+        view.set_moving(self._moving)
         # Queued: it fails while it is painted, and cannot be replaced there.
         view.failed.connect(self._on_failed, Qt.ConnectionType.QueuedConnection)
         self._stack.addWidget(view)

@@ -10,12 +10,14 @@ from cosmic.frame.overrides import override
 from cosmic.mico.gui.scene.annotations import draw_plate
 from cosmic.mico.gui.scene.camera import Sight
 from cosmic.mico.gui.scene.content import SceneContent
+from cosmic.mico.gui.scene.picking import Ray
 
 
 class SceneView(QWidget):
     """Shows a `SceneContent`; GUI thread.
 
-    Drag with the left button turns, with the middle or right button shifts, the wheel zooms.
+    Drag with the left button turns, with the middle or right button shifts, the wheel zooms. While
+    `moving` is on, the left button aims a tool instead.
 
     Signals
     -------
@@ -23,10 +25,16 @@ class SceneView(QWidget):
         The body under the cursor; empty when there is none.
     failed(str)
         It cannot draw any more, and why.
+    aimed(object)
+        The line of sight, a `Ray`, that the left button is held on while `moving`; None: no longer.
+    placed(object)
+        The one on which it was let go.
     """
 
     hovered = Signal(str)
     failed = Signal(str)
+    aimed = Signal(object)
+    placed = Signal(object)
 
     def __init__(self, content: SceneContent, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -35,6 +43,7 @@ class SceneView(QWidget):
         self._hovered = ""
         self._cursor = QPointF()
         self._dragged_from = QPointF()
+        self._moving = self._aiming = False
         self.setMouseTracking(True)
         # Keys belong to what jogs the axes: this view never takes them.
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -59,6 +68,16 @@ class SceneView(QWidget):
     def body_at(self, place: QPointF) -> str:
         """Return the body seen at `place`, px; empty when there is none."""
         raise NotImplementedError
+
+    def ray_at(self, place: QPointF) -> Ray | None:
+        """Return the line of sight at `place`, px; None where nothing is looked at."""
+        raise NotImplementedError
+
+    def set_moving(self, on: bool) -> None:
+        """Have the left button aim a tool, or turn what is seen."""
+        self._moving, self._aiming = on, False
+        shape = Qt.CursorShape.PointingHandCursor if on else Qt.CursorShape.ArrowCursor
+        self.setCursor(shape)
 
     def drag(self, before: QPointF, now: QPointF, *, turn: bool) -> None:
         """Turn or shift what is seen."""
@@ -91,10 +110,27 @@ class SceneView(QWidget):
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self._dragged_from = event.position()
         self._hover("")
+        if self._moving and event.button() == Qt.MouseButton.LeftButton:
+            self._aiming = True
+            self.aimed.emit(self.ray_at(event.position()))
+
+    @override
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        if not self._aiming or event.button() != Qt.MouseButton.LeftButton:
+            super().mouseReleaseEvent(event)
+            return
+        self._aiming = False
+        ray = self.ray_at(event.position())
+        self.aimed.emit(None)
+        if ray is not None:
+            self.placed.emit(ray)
 
     @override
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         now = event.position()
+        if self._aiming:
+            self.aimed.emit(self.ray_at(now))
+            return
         if event.buttons() == Qt.MouseButton.NoButton:
             self._cursor = now
             self._hover(self.body_at(now))
