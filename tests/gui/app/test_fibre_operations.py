@@ -21,7 +21,7 @@ from cosmic.vico.gui.vico_gui import make_vico_gui
 from gui.app.windows import Make
 
 LEFT = Qt.MouseButton.LeftButton
-LONG_MS = 120_000
+LONG_MS = 240_000
 
 
 def tasks(window: OperatorWindow) -> TaskLayout:
@@ -162,6 +162,7 @@ def test_what_cannot_be_done_with_a_fibre_says_why_and_moves_nothing(
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(600)
 def test_a_fibre_is_picked_up_and_bent_and_recorded_by_fifteen_actions(
     make: Make, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

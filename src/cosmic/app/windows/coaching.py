@@ -148,18 +148,13 @@ class _Rules:
             holder = operations.handling.held_by
             text = f"The {holder} gripper holds a fibre. {request.title} comes next."
             return Step(text, request.title, lambda: operations.begin(request))
-        view = self._parts.stage.camera
-        found = view.camera.analysis
         if spaces.current != "Handle" or operations.used:
             return None
-        if found is None:
+        view = self._parts.stage.camera
+        if not operations.finding(view):
             text = "To take a fibre, have the fibres found, then right-click one in the image."
             return Step(text, "Find fibres", lambda: operations.find(view, on=True))
-        return (
-            Step("Right-click a fibre in the image to take it with a gripper.")
-            if (found.fibres)
-            else None
-        )
+        return Step("Right-click a fibre in the image to take it with a gripper.")
 
     def task(self) -> Step | None:
         """Propose what the workspace in front is for."""

@@ -57,6 +57,7 @@ class FibreOperations(QObject):
         stage.set_card(self.card)
         self._relay: Relay[()] | None = None
         self._shown: object = None
+        self._cameras, self._found_on = list(cameras), list[CameraView]()
         self.card.resized.connect(stage.lay_card)
         self.card.next_requested.connect(self._on_next)
         self.card.undo_requested.connect(self.undo)
@@ -123,13 +124,15 @@ class FibreOperations(QObject):
         menu.setToolTipsVisible(True)
 
     def _offer_finding(self, view: CameraView, menu: QMenu) -> None:
-        link = next((each for each in view.camera.algorithms if each.name == _FIBRES), None)
-        if link is None:
-            return
         action = menu.addAction("Find fibres")
         action.setCheckable(True)
-        action.setChecked(link.on)
+        action.setChecked(self.finding(view))
         action.triggered.connect(lambda on: self.find(view, on=on))
+
+    @staticmethod
+    def finding(view: CameraView) -> bool:
+        """Tell whether fibres are found on the images of a camera."""
+        return any(each.name == _FIBRES and each.on for each in view.camera.algorithms)
 
     def find(self, view: CameraView, *, on: bool) -> None:
         """Have fibres found on the images of a camera, or not."""
@@ -175,6 +178,9 @@ class FibreOperations(QObject):
             self._offer_next()
             self.ended.emit()
             return
+        self._found_on = [view for view in self._cameras if self.finding(view)]
+        for view in self._found_on:  # what an operation looks for, it finds by itself
+            self.find(view, on=False)
         self.card.follow(request.title, run)
         run.start()
         self.began.emit(request.title)
@@ -215,6 +221,9 @@ class FibreOperations(QObject):
             self.card.refresh()
             return
         self._shown = result
+        for view in self._found_on:
+            self.find(view, on=True)
+        self._found_on = []
         self.card.show_result(result)
         self._offer_next()
         self.ended.emit()
