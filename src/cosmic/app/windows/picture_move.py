@@ -82,7 +82,7 @@ class PictureMove(QObject):
     def _follow(self, view: CameraView) -> None:
         view.tools.aimed.connect(lambda point, what: self._on_aimed(view, point, what))
         view.tools.refused.connect(
-            lambda verdict, point, what: self._on_refused(verdict, point, what, view)
+            lambda verdict, point, what: self._on_refused(view, verdict, point, what)
         )
         view.view.height_wheeled.connect(self._on_wheeled)
 
