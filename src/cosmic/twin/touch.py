@@ -41,8 +41,13 @@ class Touch:
         return self.pressed
 
     def lose(self) -> None:
-        """End the contact: it came off, or slid off."""
+        """End the contact: it slid off, and the probe stands behind the body."""
         self.pressed = False
+
+    def come_off(self) -> None:
+        """End the contact on the side where it began: it was drawn apart."""
+        self.pressed = False
+        self._travel = min(self._travel, 0.0)
 
     def _came_from_front(self, before: float, way_before: float) -> bool:
         if way_before > 0.0 or self._reach is None:

@@ -273,8 +273,11 @@ class Workspace:
         self._slack_um = 0.0
         curve = fibre.push(line, along, travel, self._probe_shape, self._time_s)
         force = curve.force_un(travel)
-        if travel > curve.reach_um or force < -self._contact.pull_off_un:
+        if travel > curve.reach_um:
             touch.lose()
+            return None
+        if force < -self._contact.pull_off_un:
+            touch.come_off()
             return None
         deflection = travel + back - force / self._sensor
         if line.free is None:
@@ -353,7 +356,7 @@ class Workspace:
             return NOTHING
         self._slack_um = 0.0
         if travel < 0.0:
-            touch.lose()
+            touch.come_off()
             return NOTHING
         return self._sensor * travel
 

@@ -247,6 +247,15 @@ def test_a_charged_fibre_jumps_to_the_probe() -> None:
     assert pull_before_contact(2.0) < -0.1
 
 
+def test_a_charged_ribbon_on_edge_is_pushed_though_its_jump_does_not_hold() -> None:
+    ribbon = with_fibre(charge_uc_m2=2.0, plane_ratio=10.0, orientation_deg=80.0)
+    bench = Bench(ribbon).go(left_x=3600.0).go(left_z=-810.0).go(probe_y=-4975.0)
+    for step in range(8):
+        bench.go(probe_y=-4975.0 - 2.5 * step)
+    end_s = bench.start({"probe.y": -4995.0}, 2.0)
+    assert bench.force_side.force_un(np.array([bench.now_s, end_s]))[-1] > 5.0
+
+
 def test_a_fibre_that_sticks_more_than_it_is_held_stays_on_the_plate() -> None:
     def lifted(**more: float) -> list[str]:
         grip = more.pop("grip_un")
