@@ -160,6 +160,13 @@ def _add_measure(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--every", type=int, default=1, metavar="N", help="of a video each N-th image only"
     )
     measure.add_argument("--overwrite", action="store_true", help="replace results that exist")
+    correct = commands.add_parser("correct", help="correct the fibres found on an image")
+    correct.add_argument("image", type=Path, metavar="IMAGE")
+    correct.add_argument(
+        "--export", type=Path, metavar="FOLDER", help="write training data and open no window"
+    )
+    correct.add_argument("--offscreen", type=float, metavar="SECONDS", help="close by itself")
+    correct.add_argument("--screenshot", type=Path, metavar="FILE", help="of the last moment")
 
 
 def _add_simulate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

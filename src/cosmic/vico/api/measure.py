@@ -1,5 +1,7 @@
 """Fibres on images from anywhere: `cosmic.measure` and what writes its results."""
 
+from cosmic.vico.core.measuring.corrections import Corrections as Corrections
+from cosmic.vico.core.measuring.corrections import side_file as side_file
 from cosmic.vico.core.measuring.image_files import SUFFIXES as SUFFIXES
 from cosmic.vico.core.measuring.image_files import read_images as read_images
 from cosmic.vico.core.measuring.measured_files import write_csv as write_csv

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from cosmic.app.cli import main
 from cosmic.frame.errors import ConfigError, RecordingError
 from cosmic.vico.api import find_fibres
 from cosmic.vico.core.measuring.corrections import Corrections
@@ -99,3 +100,13 @@ def test_training_data_has_pixels_labels_and_lines(tmp_path: Path) -> None:
     assert {int(labels[100, 80]), int(labels[100, 300])} == {1, 2}
     assert np.array_equal(cv2.imread(str(tmp_path / "one.png"), cv2.IMREAD_UNCHANGED), IMAGE)
     assert len(json.loads((tmp_path / "one.json").read_text())["fibres"]) == 2
+
+
+def test_training_data_of_what_was_saved_are_exported_by_a_command(tmp_path: Path) -> None:
+    file = tmp_path / "a.png"
+    cv2.imwrite(str(file), IMAGE)
+    edits = corrected()
+    edits.delete(1)
+    edits.save(file)
+    assert main(["correct", str(file), "--export", str(tmp_path / "out")]) == 0
+    assert json.loads((tmp_path / "out" / "a.json").read_text())["fibres"] == []

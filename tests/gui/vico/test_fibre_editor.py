@@ -1,0 +1,94 @@
+"""Fibres on an image are corrected by the mouse."""
+
+from collections.abc import Callable
+
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from pytestqt.qtbot import QtBot
+
+from cosmic.frame.errors import RecordingError
+from cosmic.vico.api import find_fibres
+from cosmic.vico.core.measuring.corrections import Corrections
+from cosmic.vico.gui.fibre_editor import FibreEditor
+from unit.vico.vision.drawn_fibres import arc, drawn_image
+
+IMAGE = drawn_image([arc((60.0, 100.0), 0.0, 300.0, 0.0)], [9.0], shape=(300, 400))
+LEFT = Qt.MouseButton.LeftButton
+Saved = Callable[[], str]
+
+
+def make(qtbot: QtBot, save: Saved = lambda: "kept") -> FibreEditor:
+    editor = FibreEditor(IMAGE, Corrections(IMAGE, find_fibres(IMAGE)), save)
+    qtbot.addWidget(editor)
+    editor.resize(700, 600)
+    editor.show()
+    qtbot.waitExposed(editor)
+    editor.view.fit()
+    return editor
+
+
+def at(editor: FibreEditor, x: float, y: float) -> QPoint:
+    return editor.view.to_screen.map(QPointF(x, y)).toPoint()
+
+
+def click(qtbot: QtBot, editor: FibreEditor, x: float, y: float) -> None:
+    qtbot.mouseClick(editor.view.viewport(), LEFT, pos=at(editor, x, y))
+
+
+def choose(qtbot: QtBot, editor: FibreEditor, edit: str) -> None:
+    qtbot.mouseClick(editor.edits[edit], LEFT)
+
+
+def lengths(editor: FibreEditor) -> list[int]:
+    return sorted(round(each.length_px) for each in editor.corrections.lines)
+
+
+def test_a_click_cuts_another_deletes_and_undo_brings_all_back(qtbot: QtBot) -> None:
+    editor = make(qtbot)
+    assert not editor.undo.isEnabled()
+    choose(qtbot, editor, "cut")
+    click(qtbot, editor, 160.0, 100.0)
+    assert lengths(editor) == pytest.approx([100, 200], abs=4)
+    choose(qtbot, editor, "delete")
+    click(qtbot, editor, 80.0, 100.0)
+    assert lengths(editor) == pytest.approx([200], abs=4)
+    qtbot.mouseClick(editor.undo, LEFT)
+    qtbot.mouseClick(editor.undo, LEFT)
+    assert lengths(editor) == pytest.approx([300], abs=2)
+    qtbot.mouseClick(editor.redo, LEFT)
+    assert len(lengths(editor)) == 2
+
+
+def test_clicks_add_a_fibre_that_a_second_click_on_its_end_finishes(qtbot: QtBot) -> None:
+    editor = make(qtbot)
+    choose(qtbot, editor, "add")
+    for x in (100.0, 200.0, 300.0, 300.0):
+        click(qtbot, editor, x, 220.0)
+    assert lengths(editor) == pytest.approx([200, 300], abs=4)
+
+
+def test_an_end_is_dragged_and_two_fibres_are_joined(qtbot: QtBot) -> None:
+    editor = make(qtbot)
+    choose(qtbot, editor, "move end")
+    pane = editor.view.viewport()
+    qtbot.mousePress(pane, LEFT, pos=at(editor, 360.0, 100.0))
+    qtbot.mouseMove(pane, at(editor, 250.0, 100.0))
+    qtbot.mouseRelease(pane, LEFT, pos=at(editor, 250.0, 100.0))
+    assert lengths(editor) == pytest.approx([190], abs=4)
+    editor.corrections.add([(270.0, 100.0), (380.0, 100.0)])
+    choose(qtbot, editor, "join")
+    click(qtbot, editor, 150.0, 100.0)
+    click(qtbot, editor, 330.0, 100.0)
+    assert lengths(editor) == pytest.approx([320], abs=5)
+
+
+def test_what_is_refused_or_cannot_be_saved_is_said(qtbot: QtBot) -> None:
+    def fails() -> str:
+        raise RecordingError("the disk is full")
+
+    editor = make(qtbot, fails)
+    choose(qtbot, editor, "delete")
+    click(qtbot, editor, 200.0, 250.0)
+    assert "No fibre" in editor.note.text()
+    qtbot.mouseClick(editor.save, LEFT)
+    assert "disk is full" in editor.note.text()
