@@ -161,6 +161,30 @@ def test_what_cannot_be_done_with_a_fibre_says_why_and_moves_nothing(
     assert {name: each.position for name, each in manager.states().items()} == before
 
 
+def test_a_gripper_closes_gently_and_says_how_far_it_is_open(make: Make, qtbot: QtBot) -> None:
+    window = with_fibres(make, qtbot)
+    tool = tasks(window).tool
+    gently = window.findChild(QPushButton, "gripperGently")
+    opening = window.findChild(QLabel, "gripperOpening")
+    assert isinstance(gently, QPushButton)
+    assert isinstance(opening, QLabel)
+    assert window.platform.mico is not None
+    manager = window.platform.mico.manager
+    qtbot.waitUntil(lambda: manager.state("left.gripper").present)
+    qtbot.waitUntil(lambda: opening.text() == "30 ± ? µm")
+    tool.move_once("left.gripper", 1)  # by 10 um: a known beginning
+    qtbot.waitUntil(lambda: not manager.state("left.gripper").in_motion)
+    before = manager.state("left.gripper").position or 0.0
+    hand = Hand(window, qtbot)
+    hand.click(gently)
+    card = done(window, qtbot, "Close gently")
+    assert (manager.state("left.gripper").position or 0.0) < before
+    assert "0 ± 49 µm" in card.findChildren(QLabel, "operationValue")[0].text()
+    qtbot.waitUntil(lambda: opening.text() == "0 ± 49 µm")
+    assert window.platform.mico.collision is not None
+    assert window.platform.mico.collision.allowed_contacts == frozenset()
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_a_fibre_is_picked_up_and_bent_and_recorded_by_fifteen_actions(

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from cosmic.app.panels.gripper_row import GripperRow
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, styled, tight_row, tipped
 from cosmic.frame.gui.quantity_field import QuantityField
@@ -129,9 +130,12 @@ class ToolPanel(QWidget):
     -------
     tool_chosen(str)
         Another tool is in use.
+    close_gently_requested(str)
+        The jaws of that tool are to close slowly, until they hold.
     """
 
     tool_chosen = Signal(str)
+    close_gently_requested = Signal(str)
 
     def __init__(self, gui: MicoWidget, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -141,6 +145,8 @@ class ToolPanel(QWidget):
         self._tools = {each.name: each for each in tools_of(list(self._mico.names))}
         self._tool = next(iter(self._tools), "")
         self._rows: dict[str, _TargetRow] = {}
+        self._grippers: dict[str, GripperRow] = {}
+        self._closes_gently = False
         self._steps: dict[str, float] = {}
         self._stopped = ""
         self._verdict: MoveVerdict | None = None
@@ -254,7 +260,7 @@ class ToolPanel(QWidget):
         """Make pad and targets of the chosen tool."""
         old, self._body = self._body, QWidget()
         self._feed.clear()
-        self._rows = {}
+        self._rows, self._grippers = {}, {}
         body = QVBoxLayout(self._body)
         body.setContentsMargins(0, 0, 0, 0)
         body.setSpacing(STEP_PX // 2)
@@ -328,20 +334,24 @@ class ToolPanel(QWidget):
         return button
 
     def _make_gripper(self, axis: Axis) -> QWidget:
-        row, line = tight_row(STEP_PX // 2)
-        for direction, text in ((-1, "close"), (1, "open")):
-            button = styled(push_button(text, f"{text} the jaws by the step"), "narrow")
-            button.setAccessibleName(f"{axis.name} {text}")
-            button.clicked.connect(lambda _=False, d=direction: self.move_once(axis.name, d))
-            line.addWidget(button)
-        width = QuantityField("um", low=0.0, name=f"Opening of {axis.name}; Enter goes there")
-        named(width, "gripperWidth").setMinimumWidth(9 * STEP_PX)
-        state = axis.details
-        if state.shown_position is not None:
-            width.set_value(round(state.shown_position))
-        width.entered.connect(lambda there: self.open_to(axis.name, there, width))
-        line.addWidget(width, 1)
+        name, tool = axis.name, self._tool
+        row = GripperRow(
+            axis,
+            lambda direction: self.move_once(name, direction),
+            lambda there, field: self.open_to(name, there, field),
+            lambda: self.close_gently_requested.emit(tool),
+            lambda: self._gui.cards[name].halt() if name in self._gui.cards else None,
+        )
+        row.gently.setEnabled(self._closes_gently)
+        self._grippers[name] = row
+        self._feed.add(name, row)
         return row
+
+    def offer_gently(self) -> None:
+        """Offer to close grippers gently: somebody carries that out."""
+        self._closes_gently = True
+        for row in self._grippers.values():
+            row.gently.setEnabled(True)
 
     def open_to(self, name: str, there_um: float, field: QuantityField) -> None:
         """Open or close a gripper to a width, as far as its steps tell; uncertain as these are."""
@@ -613,6 +623,8 @@ class ToolPanel(QWidget):
             self._feed.clear()
             for name, row in self._rows.items():
                 self._feed.add(name, row)
+            for name, gripper in self._grippers.items():
+                self._feed.add(name, gripper)
 
     @override
     def setVisible(self, visible: bool) -> None:

@@ -191,6 +191,12 @@ class FibreOperations(QObject):
 
         self.begin(OperationRequest(SingleOperation.PUSH, force_un=force_un))
 
+    def close_gently(self, gripper: str) -> None:
+        """Close the jaws of a gripper slowly, until they hold."""
+        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+
+        self.begin(OperationRequest(SingleOperation.CLOSE, gripper))
+
     def undo(self) -> None:
         """Take back what was done last with the held fibre."""
         from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation

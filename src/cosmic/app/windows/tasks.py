@@ -160,6 +160,8 @@ class TaskLayout(QObject):
         self.operations: FibreOperations | None = None
         if can_run(platform):
             self.operations = FibreOperations(rig, self.stage, scene, views, self)
+            self.tool.offer_gently()
+            self.tool.close_gently_requested.connect(self.operations.close_gently)
         self.force = ForcePanel(rig.daqco, gui, self.folder) if instruments.force else None
         self.results = ResultsPanel(self._folders, platform.policy, self._model)
         self.book = AlarmBook(self)

@@ -61,8 +61,11 @@ def in_step(work: HandlingContext) -> bool:
     return known and abs((counted or 0.0) - (work.gap_um or 0.0)) < COUNT_UM
 
 
-def move_jaws(work: HandlingContext, by_um: float) -> Steps:
-    """Open the jaws, or close them: open loop, a step at full voltage is what the file says."""
+def move_jaws(work: HandlingContext, by_um: float, *, frequency_hz: float | None = None) -> Steps:
+    """Open the jaws, or close them: open loop, a step at full voltage is what the file says.
+
+    As fast as configured unless `frequency_hz` says otherwise.
+    """
     axis = work.mico[work.gripper.gap_axis]
     step_um = next(
         (
@@ -76,7 +79,7 @@ def move_jaws(work: HandlingContext, by_um: float) -> Steps:
     if steps:
         # They may be at the plate; the gate knows of no smaller movement than their whole travel.
         with work.mico.collision.contact("grasp"):
-            frequency_hz = work.settings.grasp.gripper_hz
-            yield RetryingMove(lambda: axis.steps(steps, frequency_hz=frequency_hz, wait=False))
+            hertz = frequency_hz or work.settings.grasp.gripper_hz
+            yield RetryingMove(lambda: axis.steps(steps, frequency_hz=hertz, wait=False))
     if work.gap_um is not None:
         work.gap_um = max(0.0, work.gap_um + steps * step_um)

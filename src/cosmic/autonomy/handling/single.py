@@ -1,6 +1,7 @@
 """What only single operations need: lift, push to a force, put back where it came from."""
 
 import math
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,9 +12,10 @@ from cosmic.autonomy.bending.plan import DRY_EI_N_M2, PlannedSpan
 from cosmic.autonomy.bending.result import UN_UM2_PER_N_M2, SpanFit
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
+from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.grasp import in_jaws, seen_at, shape_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
-from cosmic.autonomy.handling.jaws import move_jaws
+from cosmic.autonomy.handling.jaws import move_jaws, note_gap
 from cosmic.autonomy.handling.plate import along
 from cosmic.autonomy.handling.prepare import retract_probe, zoom_to
 from cosmic.autonomy.handling.push import (
@@ -25,7 +27,7 @@ from cosmic.autonomy.handling.push import (
 )
 from cosmic.autonomy.handling.put_away import ADHESION
 from cosmic.autonomy.handling.reach import STAND_BACK_UM, line_of
-from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
+from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Yielded
 from cosmic.vico.core.image import CameraImage
 
 NOT_HELD: Final = "no fibre held"
@@ -38,6 +40,13 @@ BEND_PART: Final = 0.05
 """Of the span: how far a fibre should bend at the force wanted; the span is chosen by it."""
 MOST_BEND_PART: Final = 0.2
 """How far it may bend before the push is given up."""
+GENTLE_UM: Final = 5.0
+GENTLE_HZ: Final = 200.0
+"""How far the jaws close between two looks at the force, and how fast their steps come."""
+HELD_STD_UM: Final = 25.0
+"""How well closed jaws are known to be closed: a fibre may be between."""
+GENTLE_TIMES: Final = 3.0
+"""Of the force that means contact: what ends a gentle closing."""
 NEAR_PART: Final = 0.02
 """How near the force wanted is near enough."""
 
@@ -227,6 +236,48 @@ class StandOff(FibreOperation):
         x, y = work.tip_now(work.probe)
         back = push.stand_off_um + push.search_um
         yield work.go(work.at(work.probe, x, y - back * (1.0 if work.probe.forward[1] > 0 else -1)))
+
+
+class CloseGently(FibreOperation):
+    """The jaws close slowly, a little at a time, until something is felt or they are closed.
+
+    What they hold is not felt by themselves: the force is that of the probe's sensor, where a fibre
+    touches it. Without any, the number of steps is the limit.
+    """
+
+    name = "close gently"
+
+    def __init__(self) -> None:
+        self.closed_um = 0.0
+        self.felt_un: float | None = None
+
+    @override
+    def steps(self, work: HandlingContext) -> Steps:
+        axis = work.mico[work.gripper.gap_axis]
+        opening_um = axis.position_um
+        if opening_um is None:
+            raise OperationFailed(
+                "opening unknown", f"{axis.name}: its opening is unknown; initialise the platform"
+            )
+        base_un = yield from self._force_un(work)
+        most_um = opening_um + work.settings.grasp.closing_um
+        while self.closed_um < most_um:
+            yield from move_jaws(work, -GENTLE_UM, frequency_hz=GENTLE_HZ)
+            self.closed_um += GENTLE_UM
+            force_un = yield from self._force_un(work)
+            if base_un is None or force_un is None:
+                continue
+            if abs(force_un - base_un) > GENTLE_TIMES * work.settings.push.contact_un:
+                self.felt_un = force_un - base_un
+                return
+        note_gap(work, 0.0, HELD_STD_UM)
+
+    @staticmethod
+    def _force_un(work: HandlingContext) -> Generator[Yielded, object, float | None]:
+        if not work.forces.running:
+            return None
+        mean = yield work.forces.wanted(work.settings.push.search_average_s)
+        return mean.mean_un if isinstance(mean, ForceMean) else None
 
 
 class CarryBack(FibreOperation):

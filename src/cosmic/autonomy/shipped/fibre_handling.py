@@ -16,13 +16,14 @@ from cosmic.autonomy.handling.context import Applications, HandlingContext, visi
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.marked import MarkedFibre, approach_to
 from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.handling.single import PushToForce, is_at_probe
+from cosmic.autonomy.handling.single import CloseGently, PushToForce, is_at_probe
 from cosmic.autonomy.procedures.failures import ProcedureStopped
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun, RunState
 from cosmic.autonomy.shipped.single import (
     build_bring,
     build_carry_back,
+    build_close_gently,
     build_lay_back,
     build_measure,
     build_push,
@@ -50,6 +51,7 @@ class SingleOperation(StrEnum):
     MEASURE = "measure"
     PUT_AWAY = "put away"
     UNDO = "undo"
+    CLOSE = "close gently"
 
 
 PUSHES: Final = frozenset({SingleOperation.PUSH, SingleOperation.MEASURE})
@@ -239,6 +241,8 @@ class FibreHandling:
             return f"{other} is running; end it first"
         if request.operation is SingleOperation.TAKE:
             return self._why_not_take(request)
+        if request.operation is SingleOperation.CLOSE:
+            return self._why_no_gripper(request)
         if self.fibre is None:
             return "no gripper holds a fibre; take one first"
         if request.operation is SingleOperation.UNDO:
@@ -253,12 +257,15 @@ class FibreHandling:
     def _why_not_take(self, request: OperationRequest) -> str:
         if request.marked is None:
             return "no fibre is marked; find the fibres, and choose one in the image"
-        if request.gripper not in self.grippers:
-            known = ", ".join(self.grippers) or "none"
-            return f"there is no gripper {request.gripper!r}; there are: {known}"
         if self.fibre is not None:
             return f"{self._gripper} holds a fibre; put it away first"
-        return ""
+        return self._why_no_gripper(request)
+
+    def _why_no_gripper(self, request: OperationRequest) -> str:
+        if request.gripper in self.grippers:
+            return ""
+        known = ", ".join(self.grippers) or "none"
+        return f"there is no gripper {request.gripper!r}; there are: {known}"
 
     def preview(self, request: OperationRequest) -> OperationPreview:
         """Return what an operation would do, or why it cannot begin; nothing moves."""
@@ -266,6 +273,8 @@ class FibreHandling:
             return OperationPreview(why)
         if request.operation is SingleOperation.TAKE and request.marked is not None:
             return self._preview_take(request.gripper, request.marked)
+        if request.operation is SingleOperation.CLOSE:
+            return OperationPreview(f"The jaws of {request.gripper} close slowly until they hold.")
         work = self._contexts[self._gripper]
         positions = work.settings.places
         now = positions_of(work.mico.states())
@@ -326,9 +335,10 @@ class FibreHandling:
             if why := self.why_not(request):
                 raise NotAvailable(f"{request.title}: {why}")
             taking = request.operation is SingleOperation.TAKE
-            work = self._context(request.gripper if taking else self._gripper)
-            push = PushToForce(request.force_un)
-            procedure = self._procedure(request, work, push)
+            own = taking or request.operation is SingleOperation.CLOSE
+            work = self._context(request.gripper if own else self._gripper)
+            push, closing = PushToForce(request.force_un), CloseGently()
+            procedure = self._procedure(request, work, push, closing)
             if taking:
                 self._gripper, self._done = request.gripper, []
                 work.shared.surveyed = False
@@ -342,7 +352,7 @@ class FibreHandling:
                 self._changed.emit()
             elif not done:
                 done = True
-                self._on_end(request, run, push)
+                self._on_end(request, run, push, closing)
 
         run.on_change(look)
         return run
@@ -361,9 +371,15 @@ class FibreHandling:
             return self._contexts[gripper]
 
     def _procedure(
-        self, request: OperationRequest, work: HandlingContext, push: PushToForce
+        self,
+        request: OperationRequest,
+        work: HandlingContext,
+        push: PushToForce,
+        closing: CloseGently,
     ) -> Procedure[HandlingContext]:
         operation = request.operation
+        if operation is SingleOperation.CLOSE:
+            return build_close_gently(closing)
         if operation is SingleOperation.TAKE and request.marked is not None:
             return build_take(work.settings, request.marked)
         if operation is SingleOperation.PUSH:
@@ -379,11 +395,13 @@ class FibreHandling:
         request: OperationRequest,
         run: ProcedureRun[HandlingContext],
         push: PushToForce,
+        closing: CloseGently,
     ) -> None:
         work = run.work
         work.shared.unsuitable = []
         if run.failure is None:
-            values, text = _found(request, work, push)
+            closed = request.operation is SingleOperation.CLOSE
+            values, text = _closed(work, closing) if closed else _found(request, work, push)
             result = OperationResult(request.title, good=True, text=text, values=values)
             self._note_done(request.operation)
         else:
@@ -398,6 +416,8 @@ class FibreHandling:
         self._changed.emit()
 
     def _note_done(self, operation: SingleOperation) -> None:
+        if operation is SingleOperation.CLOSE:
+            return
         if operation is SingleOperation.UNDO or (operation in PUSHES and self.last in PUSHES):
             self._done.pop()  # several pushes are taken back as one: the probe goes away
         if operation is not SingleOperation.UNDO:
@@ -469,6 +489,17 @@ def _found(
     if operation is SingleOperation.MEASURE and fibre.bending is not None:
         return _stiffness(fibre.bending), "The bending stiffness is measured."
     return (), f"Taken back; {work.settings.gripper} still holds the fibre."
+
+
+def _closed(work: HandlingContext, closing: CloseGently) -> tuple[Values, str]:
+    state = work.mico[work.gripper.gap_axis].details
+    opening = math.nan if state.position is None else state.position
+    values = [("opening", f"{with_interval(opening, state.std)} µm")]
+    text = "The jaws have made all their steps: they are closed, or hold what is between."
+    if closing.felt_un is not None:
+        values.append(("force", f"{closing.felt_un:+.1f} µN"))
+        text = "Closing ended: a force was felt."
+    return tuple(values), text
 
 
 def _size(fibre: HeldFibre) -> Values:

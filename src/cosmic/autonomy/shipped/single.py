@@ -11,6 +11,7 @@ from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.single import (
     AtProbe,
     CarryBack,
+    CloseGently,
     Held,
     LayBack,
     LiftUp,
@@ -63,6 +64,11 @@ def build_lay_back() -> Procedure[HandlingContext]:
 def build_carry_back() -> Procedure[HandlingContext]:
     """Return what brings the held fibre back from the probe; the probe draws back first."""
     return _procedure("carry it back", Held(), CarryBack())
+
+
+def build_close_gently(closing: CloseGently) -> Procedure[HandlingContext]:
+    """Return what closes the jaws slowly; nothing is moved to be safe when it ends early."""
+    return Procedure(closing.name, Sequence(closing.name, closing))
 
 
 def build_retract() -> Procedure[HandlingContext]:
