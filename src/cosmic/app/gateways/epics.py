@@ -82,6 +82,7 @@ class EpicsGateway:
         self._values: dict[str, ValueRecord] = {}
         self._states: dict[tuple[str, ...], Channel] = {}
         self._images: dict[str, tuple[Channel, Channel, Channel, Channel]] = {}
+        self._looked = 0
         self._control = ca.whole(put=self._take)
         self._holder = ca.line()
         channels = dict(self._all_channels())
@@ -189,9 +190,10 @@ class EpicsGateway:
     async def look(self, axis: str) -> PositionerState:
         """Return the newest state of an axis."""
         host = self._hosts["mico"]
-        job = self._queues["reads"].submit(lambda: host.state(whole=False).values, "state")
+        job = self._queues["reads"].submit(lambda: host.state(whole=False), "state")
         await _ended(job)
-        held: Any = job.result["axes"]
+        self._looked = max(self._looked, job.result.number)
+        held: Any = job.result.values["axes"]
         found: PositionerState = held[axis]["_latest"]
         return found
 
@@ -279,7 +281,10 @@ class EpicsGateway:
 
     async def _show_one(self, topic: str, payload: object) -> None:
         if isinstance(payload, StateMessage):
-            await self._show_state(topic.partition("/")[0], payload.values)
+            application = topic.partition("/")[0]
+            if application == "mico" and payload.number < self._looked:
+                return  # a motion that has ended meanwhile would begin again
+            await self._show_state(application, payload.values)
         elif isinstance(payload, LeaseState):
             await ca.show(self._holder, payload.holder[:39])
             await ca.show(self._control, int(not payload.local))

@@ -53,6 +53,8 @@ class MotorRecord:
         self._zero = state.zero
         self._commander = commander
         self._moves = 0
+        self._in_motion = state.in_motion
+        self._edge = asyncio.Lock()
         self._alarm: Alarm = ca.NO_ALARM
         limits = state.limits or (0.0, 0.0)
         place = state.position or 0.0
@@ -122,12 +124,15 @@ class MotorRecord:
         for field, value in (("LLM", low - state.zero), ("HLM", high - state.zero)):
             await ca.show(fields[field], value)
         await ca.show(fields["OFF"], -state.zero)
+        self._in_motion = state.in_motion
         if not self._moves:
-            await self._show_moving(moving=state.in_motion)
+            await self._show_moving()
 
-    async def _show_moving(self, *, moving: bool) -> None:
-        await ca.show(self._fields["MOVN"], int(moving))
-        await ca.show(self._fields["DMOV"], int(not moving))
+    async def _show_moving(self) -> None:
+        async with self._edge:  # one that says "done" late must not end the next move
+            moving = self._moves > 0 or self._in_motion
+            await ca.show(self._fields["MOVN"], int(moving))
+            await ca.show(self._fields["DMOV"], int(not moving))
 
     def _state_alarm(self, state: PositionerState) -> Alarm:
         if state.error or not state.present:
@@ -176,26 +181,28 @@ class MotorRecord:
         """Carry out one motion; the record says that it moves until the axis is at rest."""
         self._moves += 1
         self._alarm = ca.NO_ALARM
-        failure: CosmicError | None = None
         if shown is not None:
             await self._fields["VAL"].write(shown)
-        await self._show_moving(moving=True)
+        await self._show_moving()
         try:
-            await self._commander.run(who, "axes.begin", {"motion": motion}, (self._axis,))
-        except CosmicError as exc:
-            failure = exc
+            failure = await self._failure(who, motion)
+            self._alarm = _alarm_of(failure)
+            await ca.show(self._reason, "" if failure is None else str(failure)[:499])
+            await self.show(await self._commander.look(self._axis))
+            await asyncio.sleep(EDGE_S)
         finally:
             self._moves -= 1
-        self._alarm = _alarm_of(failure)
-        await ca.show(self._reason, "" if failure is None else str(failure)[:499])
-        state = await self._commander.look(self._axis)
-        await self.show(state)
-        if not self._moves and not state.in_motion:
-            await asyncio.sleep(EDGE_S)
-            await self._show_moving(moving=False)
+            await self._show_moving()
         await asyncio.sleep(SETTLED_S)
         if failure is not None:
             raise PutRefused(str(failure))
+
+    async def _failure(self, who: Who, motion: dict[str, Any]) -> CosmicError | None:
+        try:
+            await self._commander.run(who, "axes.begin", {"motion": motion}, (self._axis,))
+        except CosmicError as exc:
+            return exc
+        return None
 
 
 def _alarm_of(failure: CosmicError | None) -> Alarm:

@@ -391,7 +391,8 @@ class HttpGateway:
 
         def made() -> bytes:
             image = newest_image(user.session, camera)
-            return encoded_image(image, ending)
+            served: Any = self._host("vico").served
+            return encoded_image(image, ending, served.camera_handles[camera].axes)
 
         coded = await self._job("", made, "an image")
         kinds = {"png": "image/png", "tif": "image/tiff", "jpg": "image/jpeg"}

@@ -1,6 +1,7 @@
 """Images of a camera as files, for programs that fetch one."""
 
 import struct
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any, Final
 
@@ -10,7 +11,7 @@ from cosmic.app.gateways.session import GatewaySession
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.api.sent_image import SentImage
 from cosmic.vico.core.recording.side_row import row_of
-from cosmic.vico.core.recording.tiff_png import details, encoded_png, encoded_tiff
+from cosmic.vico.core.recording.tiff_png import encoded_png, encoded_tiff
 
 LIVE_WIDTH_PX: Final = 800
 LIVE_QUALITY: Final = 70
@@ -34,15 +35,20 @@ def newest_image(session: GatewaySession, camera: str) -> SentImage:
     return found
 
 
-def encoded_image(image: SentImage, ending: str) -> bytes:
-    """Return an image as a file: "png" and "tif" with scale and circumstances, or "jpg"."""
+def encoded_image(image: SentImage, ending: str, axes: Mapping[str, str]) -> bytes:
+    """Return an image as a file: "png" and "tif" with scale and circumstances, or "jpg".
+
+    Parameters
+    ----------
+    axes : mapping of str to str
+        Unit of each axis, "um" or "deg", by its name.
+    """
     if ending == "jpg":
         return jpeg(image.data, image.data.shape[1])
     received = image.received()
     row = row_of(received, datetime.now(UTC))
-    known = details(row, dict.fromkeys(image.positions, "um"))
     encoded = encoded_tiff if ending == "tif" else encoded_png
-    return encoded(image.data, known, image.scale_um_px)
+    return encoded(image.data, row, dict(axes))
 
 
 def shown_jpeg(payload: object) -> bytes | None:

@@ -31,7 +31,7 @@ def child(*arguments):
     )
 
 
-KILLED = (ImageFormat.FFV1, ImageFormat.FAST, ImageFormat.TIFF)
+KILLED = (ImageFormat.FFV1, ImageFormat.FAST, ImageFormat.STACK, ImageFormat.TIFF)
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 import struct
 import zlib
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import cv2
@@ -10,6 +11,7 @@ import pytest
 import tifffile
 
 from cosmic.frame.errors import RecordingError, RecordingExistsError
+from cosmic.vico.core.recording.side_row import row_of
 from cosmic.vico.core.recording.snap import save_image
 from cosmic.vico.core.recording.tiff_png import encoded_png
 from cosmic.vico.hw.interface import FrameStatus, PixelFormat
@@ -129,5 +131,6 @@ def test_a_disk_that_is_full_leaves_nothing_behind(tmp_path, monkeypatch):
 
 
 def test_texts_beyond_ascii_are_kept():
-    coded = encoded_png(noise(), {"camera": "Kamera über µ"}, None)
+    shot = replace(image(), camera="Kamera über µ")
+    coded = encoded_png(noise(), row_of(shot, UTC_NOW), {})
     assert b"camera" + bytes(5) + "Kamera über µ".encode() in coded

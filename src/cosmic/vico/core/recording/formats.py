@@ -22,6 +22,7 @@ class ImageFormat(StrEnum):
     FFV1 = "ffv1"
     FAST = "fast"
     SMALL = "small"
+    STACK = "stack"
     TIFF = "tiff"
     PNG = "png"
 
@@ -104,6 +105,12 @@ FORMATS: Final[Mapping[ImageFormat, Traits]] = {
         codec="mjpeg",
         container="matroska",
         coded=_coded("yuvj420p", "", "yuvj444p"),
+    ),
+    ImageFormat.STACK: Traits(
+        text="OME-TIFF, all images in one file, uncompressed",
+        suffix=".tif",
+        lossless=True,
+        ratio=1.0,
     ),
     ImageFormat.TIFF: Traits(
         text="a TIFF an image, uncompressed",

@@ -17,6 +17,7 @@ from cosmic.vico.core.recording.formats import (
 from cosmic.vico.core.recording.sequence_writer import SequenceWriter, image_files
 from cosmic.vico.core.recording.side_file import SideFile
 from cosmic.vico.core.recording.side_row import SideRow
+from cosmic.vico.core.recording.stack_writer import StackWriter
 from cosmic.vico.core.recording.video_writer import VideoWriter, check_codec
 from cosmic.vico.hw.interface import PixelFormat, Pixels
 
@@ -176,6 +177,8 @@ class ImageFile:
             )
         if found.sequence:
             return SequenceWriter(self._path, self._format, self._stem, self._axes)
+        if self._format is ImageFormat.STACK:
+            return StackWriter(self._path, self._axes)
         return VideoWriter(self._path, self._format, shape, pixel_format, self._rate_hz)
 
 

@@ -17,7 +17,12 @@ from cosmic.vico.core.recording.formats import SIDE_SUFFIX, ImageFormat, recordi
 from cosmic.vico.core.recording.formats import side_path_of as _side_path_of
 from cosmic.vico.core.recording.side_file import SideTable, read_side_file
 from cosmic.vico.core.recording.side_row import NOT_THERE, SideRow
-from cosmic.vico.core.recording.sources import ImageSource, SequenceSource, VideoSource
+from cosmic.vico.core.recording.sources import (
+    ImageSource,
+    SequenceSource,
+    StackSource,
+    VideoSource,
+)
 from cosmic.vico.core.recording.video_writer import TimeStamps
 from cosmic.vico.hw.interface import FrameStatus, PixelFormat, Pixels
 
@@ -200,6 +205,8 @@ class ImageRecording:
             return None
         if self._side.rows and not self._written and not self._path.stat().st_size:
             return None  # the first image failed already
+        if self._path.suffix.lower() == recording_suffix(ImageFormat.STACK):
+            return StackSource(self._path)
         colour = self.pixel_format is PixelFormat.RGB8
         return VideoSource(self._path, colour=colour, whole=self._side.complete)
 

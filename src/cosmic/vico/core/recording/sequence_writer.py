@@ -7,7 +7,7 @@ from typing import Final
 
 from cosmic.vico.core.recording.formats import ImageFormat
 from cosmic.vico.core.recording.side_row import SideRow
-from cosmic.vico.core.recording.tiff_png import details, encoded_png, encoded_tiff
+from cosmic.vico.core.recording.tiff_png import encoded_png, encoded_tiff
 from cosmic.vico.hw.interface import Pixels
 
 DIGITS: Final = 6
@@ -58,7 +58,7 @@ class SequenceWriter:
     def write(self, data: Pixels, row: SideRow) -> None:
         """Add an image."""
         encoded = encoded_png if self._png else encoded_tiff
-        coded = encoded(data, details(row, self._axes), row.circumstances.scale_um_px)
+        coded = encoded(data, row, self._axes)
         ending = ".png" if self._png else ".tif"
         path = self._directory / f"{self._stem}_{self._index:0{DIGITS}d}{ending}"
         part = path.with_name(path.name + PART)

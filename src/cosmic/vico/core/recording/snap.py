@@ -10,7 +10,7 @@ from cosmic.frame.renamed import renamed_in
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.recording.formats import kind_of, words
 from cosmic.vico.core.recording.side_row import row_of
-from cosmic.vico.core.recording.tiff_png import details, encoded_png, encoded_tiff
+from cosmic.vico.core.recording.tiff_png import encoded_png, encoded_tiff
 from cosmic.vico.hw.interface import FrameStatus
 
 _ENCODED = {".tif": encoded_tiff, ".tiff": encoded_tiff, ".png": encoded_png}
@@ -56,8 +56,7 @@ def save_image(
         raise RecordingExistsError(
             f"{whole}: there is such a file; choose another name, or say that it may be replaced"
         )
-    known = details(row_of(image, utc or datetime.now(UTC)), axes or {})
-    coded = encoded(image.data, known, image.circumstances.scale_um_px)
+    coded = encoded(image.data, row_of(image, utc or datetime.now(UTC)), axes or {})
     part = whole.with_name(whole.name + ".part")
     try:
         part.write_bytes(coded)

@@ -75,6 +75,61 @@ class SequenceSource:
         """Nothing is open."""
 
 
+class StackSource:
+    """A TIFF with a page an image, finished or cut off.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        import tifffile
+
+        self._path = path
+        self._failure = (OSError, ValueError, IndexError, tifffile.TiffFileError)
+        try:
+            self._file = tifffile.TiffFile(path)
+            self._count = self._whole()
+        except self._failure as exc:
+            raise RecordingError(f"{path}: cannot be read ({exc})") from exc
+
+    def _whole(self) -> int:
+        """Return how many pages are there with all their pixels."""
+        end = self._path.stat().st_size
+        count = 0
+        for page in self._file.pages:
+            frame = page.aspage()
+            last = zip(frame.dataoffsets, frame.databytecounts, strict=True)
+            if any(at + size > end for at, size in last):
+                break
+            count += 1
+        return count
+
+    def count(self) -> int:
+        """Return how many images there are."""
+        return self._count
+
+    def images(self) -> Iterator[Pixels]:
+        """Yield all images."""
+        for index in range(self._count):
+            yield self.image(index)
+
+    def image(self, index: int, stamp: int | None = None) -> Pixels:
+        """Return one image; `stamp` is not needed."""
+        del stamp
+        try:
+            found: Pixels = self._file.pages[index].asarray()
+        except self._failure as exc:
+            raise RecordingError(f"{self._path}: image {index} cannot be read ({exc})") from exc
+        return found
+
+    def close(self) -> None:
+        """Give the file back; harmless the second time."""
+        self._file.close()
+
+
 def read_image(path: Path) -> Pixels:
     """Return the pixels of a TIFF or PNG.
 

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from cosmic.frame.errors import RecordingError
+from cosmic.vico.core.recording.ome import described
 from cosmic.vico.core.recording.side_row import SideRow, position_texts
 from cosmic.vico.hw.interface import Pixels
 
@@ -31,23 +32,22 @@ def details(row: SideRow, axes: Mapping[str, str]) -> dict[str, str]:
     return {name: text for name, text in found.items() if text and name not in {"index", "dropped"}}
 
 
-def encoded_tiff(data: Pixels, known: Mapping[str, str], scale_um_px: float | None) -> bytes:
-    """Return an uncompressed TIFF."""
+def encoded_tiff(data: Pixels, row: SideRow, axes: Mapping[str, str]) -> bytes:
+    """Return an uncompressed OME-TIFF of one image.
+
+    Parameters
+    ----------
+    axes : mapping of str to str
+        Unit of each axis by its name.
+    """
     import tifffile
 
-    metadata: dict[str, object] = {
+    scale_um_px = row.circumstances.scale_um_px
+    metadata = described([row], scale_um_px) | {
         "axes": "YXS" if data.ndim == 3 else "YX",
-        "MapAnnotation": {"Namespace": "cosmic/image", **known},
+        "MapAnnotation": {"Namespace": "cosmic/image", **details(row, axes)},
     }
-    resolution = None
-    if scale_um_px:
-        metadata |= {
-            "PhysicalSizeX": scale_um_px,
-            "PhysicalSizeXUnit": "µm",
-            "PhysicalSizeY": scale_um_px,
-            "PhysicalSizeYUnit": "µm",
-        }
-        resolution = (UM_IN_CM / scale_um_px, UM_IN_CM / scale_um_px)
+    resolution = (UM_IN_CM / scale_um_px, UM_IN_CM / scale_um_px) if scale_um_px else None
     file = io.BytesIO()
     tifffile.imwrite(
         file,
@@ -62,10 +62,11 @@ def encoded_tiff(data: Pixels, known: Mapping[str, str], scale_um_px: float | No
     return file.getvalue()
 
 
-def encoded_png(data: Pixels, known: Mapping[str, str], scale_um_px: float | None) -> bytes:
-    """Return a PNG."""
+def encoded_png(data: Pixels, row: SideRow, axes: Mapping[str, str]) -> bytes:
+    """Return a PNG; arguments as `encoded_tiff`."""
     import cv2
 
+    known, scale_um_px = details(row, axes), row.circumstances.scale_um_px
     pixels = data[:, :, ::-1] if data.ndim == 3 else data
     done, coded = cv2.imencode(
         ".png", np.ascontiguousarray(pixels), [cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION]

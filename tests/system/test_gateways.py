@@ -1,0 +1,183 @@
+"""The simulated platform through its gateways: ophyd's motor, a notebook over HTTP, other files."""
+
+import io
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import httpx
+import numpy as np
+import pytest
+import tifffile
+
+from contract.station_rig import free_port, wait_until
+
+pytestmark = pytest.mark.slow
+
+OPHYD = """
+import json, sys
+from bluesky import RunEngine
+from bluesky.plans import scan
+from ophyd import EpicsMotor, EpicsSignal, EpicsSignalRO
+
+motor = EpicsMotor("COSMIC:left_x", name="motor")
+turn = EpicsMotor("COSMIC:table_rotation", name="turn")
+control = EpicsSignal("COSMIC:control", name="control")
+force = EpicsSignalRO("COSMIC:force", name="force")
+for each in (motor, turn, control, force):
+    each.wait_for_connection(timeout=20)
+
+def moved(target, of=motor):
+    try:
+        of.set(target).wait(20)
+    except Exception as exc:
+        return type(exc).__name__
+    return of.position
+
+found = {"without control": moved(5.0)}
+control.put(1, wait=True)
+found["with control"] = moved(10.0)
+found["again"] = [moved(10.0) for _ in range(5)]
+documents = []
+RunEngine()(scan([force], motor, 0, 20, 5), lambda name, doc: documents.append((name, doc)))
+events = [doc["data"] for name, doc in documents if name == "event"]
+found["scan"] = [each["motor"] for each in events]
+found["asked"] = [each["motor_user_setpoint"] for each in events]
+found["force"] = [each["force"] for each in events]
+found["turned"] = moved(3.0, turn)
+found["units"] = [motor.motor_egu.get(as_string=True), turn.motor_egu.get(as_string=True)]
+found["limits"] = list(motor.limits)
+try:
+    motor.set(1e6)
+except Exception as exc:
+    found["beyond"] = type(exc).__name__
+print(json.dumps(found), flush=True)
+sys.stdin.readline()  # until the platform was stopped
+found = {"while stopped": moved(15.0)}
+found["alarm"] = int(motor.user_readback.alarm_status)
+print(json.dumps(found), flush=True)
+"""
+
+
+@dataclass
+class Served:
+    http: httpx.Client
+    port: int
+    token: str
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    port, web = free_port(), free_port()
+    command = [sys.executable, "-m", "cosmic", "serve", "--epics", "COSMIC:"]
+    command += ["--http", f"127.0.0.1:{web}", "--listen", f"tcp/127.0.0.1:{free_port()}"]
+    process = subprocess.Popen(
+        command,
+        env=os.environ | {"EPICS_CA_SERVER_PORT": str(port)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        cwd=tmp_path_factory.mktemp("served"),
+    )
+    try:
+        assert process.stdout is not None
+        found = None
+        while found is None:
+            line = process.stdout.readline()
+            assert line, "the station did not start"
+            found = re.search(r"HTTP at (\S+) \(token (\S+)\)", line)
+        assert "EPICS at port" in process.stdout.readline()
+        headers = {"Authorization": f"Bearer {found[2]}"}
+        with httpx.Client(base_url=found[1], headers=headers, timeout=30.0) as http:
+            yield Served(http, port, found[2])
+    finally:
+        process.terminate()
+        process.communicate(timeout=30)
+
+
+def test_ophyds_motor_drives_an_axis_unchanged(served: Served) -> None:
+    variables = {
+        "EPICS_CA_SERVER_PORT": str(served.port),
+        "EPICS_CA_ADDR_LIST": "127.0.0.1",
+        "EPICS_CA_AUTO_ADDR_LIST": "NO",
+        "OPHYD_CONTROL_LAYER": "caproto",
+    }
+    client = subprocess.Popen(
+        [sys.executable, "-W", "ignore", "-c", OPHYD],
+        env=os.environ | variables,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert client.stdin is not None
+        assert client.stdout is not None
+        found = json.loads(client.stdout.readline())
+        assert found["without control"] == "UnknownStatusFailure"
+        assert found["with control"] == pytest.approx(10.0, abs=1.0)
+        assert found["again"] == [pytest.approx(10.0, abs=1.0)] * 5
+        assert found["asked"] == [0.0, 5.0, 10.0, 15.0, 20.0]
+        assert found["scan"] == pytest.approx(found["asked"], abs=1.0)
+        assert np.isfinite(found["force"]).all()
+        assert found["turned"] == pytest.approx(3.0, abs=0.1)
+        assert found["units"] == ["um", "deg"]
+        assert found["limits"] == [-5500.0, 5500.0]
+        assert found["beyond"] == "LimitError"
+        assert served.http.post("/api/mico/stop", json={"reason": "test"}).is_success
+        client.stdin.write("\n")
+        client.stdin.flush()
+        stopped = json.loads(client.stdout.readline())
+        assert stopped == {"while stopped": "UnknownStatusFailure", "alarm": 18}  # DISABLE
+    finally:
+        client.kill()
+        client.communicate(timeout=10)
+    assert wait_until(lambda: served.http.get("/api/station").json()["control"]["local"], 5.0)
+    assert served.http.post("/api/control").is_success
+    assert served.http.post("/api/mico/reset_stop", json={}).is_success
+    served.http.delete("/api/control")
+
+
+def test_a_notebook_moves_reads_and_fetches_over_http(served: Served) -> None:
+    http = served.http
+    assert http.get("/api/station").json()["applications"] == ["mico", "daqco", "vico"]
+    with httpx.Client() as stranger:
+        assert stranger.get(f"{http.base_url}/api/mico/state").status_code == 401
+    motion = {"motion": {"kind": "MoveTo", "target": 12.0, "unit": "um"}}
+    path = "/api/mico/axes/left.x/begin?wait=10"
+    assert http.post(path, json=motion).json()["error"]["verdict"]["reason"] == "NO_LEASE"
+    http.post("/api/control")
+    assert http.post(path, json=motion).json()["result"] == pytest.approx(12.0, abs=1.0)
+    motion["motion"]["target"] = 1e6
+    beyond = http.post(path, json=motion)
+    assert beyond.status_code == 409
+    assert beyond.json()["error"]["verdict"]["reason"] == "LIMIT"
+    http.delete("/api/control")
+    position = http.get("/api/mico/state/axes/left.x/_latest/position").json()
+    assert position == pytest.approx(12.0, abs=1.0)
+    image = http.get("/api/images/microscope.tif")
+    assert image.headers["content-type"] == "image/tiff"
+    assert wait_until(lambda: http.get("/api/images/microscope.jpg").is_success)
+
+
+def test_a_recording_is_made_listed_and_fetched(served: Served) -> None:
+    http = served.http
+    made = http.post("/api/daqco/start_recording", json={"path": "over_http.h5", "overwrite": True})
+    assert made.is_success, made.text
+    assert http.post("/api/daqco/stop_recording", json={}).is_success
+    names = [each["name"] for each in http.get("/api/files").json()]
+    assert "over_http.h5" in names
+    fetched = http.get("/api/files/over_http.h5")
+    assert fetched.content[:8] == b"\x89HDF\r\n\x1a\n"
+    assert http.get("/api/files/..%2F..%2Fetc%2Fpasswd").status_code == 404
+
+
+def test_an_image_over_http_has_its_scale_and_time(served: Served) -> None:
+    coded = served.http.get("/api/images/microscope.tif").content
+    with tifffile.TiffFile(io.BytesIO(coded)) as tif:
+        assert tif.asarray().shape == (1200, 1600)
+        assert "AcquisitionDate" in tif.ome_metadata
+        assert "left.x_um" in tif.ome_metadata
