@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from pydantic import BaseModel
 
+from cosmic.app.configuration.alarms import AlarmSettings, FallingLevels, RisingLevels
 from cosmic.app.configuration.gateways import EpicsSettings, HttpClient, HttpSettings
 from cosmic.app.configuration.network import NetworkSettings
 from cosmic.app.configuration.platform_file import PlatformFile, PlatformSettings
@@ -107,6 +108,9 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[[vico.lens.step]]": ZoomStepSettings,
     "[vico.light]": LampSettings,
     "[control]": ControlSettings,
+    "[alarms]": AlarmSettings,
+    "[alarms.force]": RisingLevels,
+    "[alarms.disk_gb]": FallingLevels,
     "[network]": NetworkSettings,
     "[network.http]": HttpSettings,
     "[[network.http.client]]": HttpClient,

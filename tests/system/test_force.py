@@ -202,3 +202,31 @@ def test_the_shipped_platform_watches_the_force_of_its_probe_from_the_start() ->
             -150.0,
             150.0,
         )
+
+
+def test_what_came_before_the_click_is_recorded_too(rig: cosmic.Rig, tmp_path: Path) -> None:
+    daqco = rig.daqco
+    wait_until(lambda: daqco.counters.samples > 3000)
+    now_s = daqco.application.clock.now_s()
+    rig.mico["probe.y"].move_by(5.0)
+    daqco.start_recording(tmp_path / "late.h5", before_s=2.0)
+    seen = daqco.counters.samples
+    wait_until(lambda: daqco.counters.samples > seen + 500)
+    daqco.stop_recording()
+    with cosmic.open_recording(tmp_path / "late.h5") as recording:
+        times = recording.time_s
+        assert recording.start_s == pytest.approx(times[0], abs=0.01)
+        assert np.diff(times) == pytest.approx(1.0 / recording.rate_hz, abs=1e-4)
+        assert times[-1] - times[0] > 2.3
+        assert times[0] < now_s + 1.0
+        assert recording.overruns == ()
+        when, _, _ = recording.positions("probe.y")
+        assert when[0] < times[0] + 0.5
+    with pytest.raises(cosmic.ConfigError, match="0 to 5 s"):
+        daqco.start_recording(tmp_path / "other.h5", before_s=60.0)
+    daqco.start_recording(tmp_path / "usual.h5")
+    begun_s = daqco.application.clock.now_s()
+    wait_until(lambda: daqco.recording.duration_s > 0.1)
+    daqco.stop_recording()
+    with cosmic.open_recording(tmp_path / "usual.h5") as recording:
+        assert recording.time_s[0] > begun_s - 0.5

@@ -6,6 +6,7 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
+from cosmic.app.configuration.alarms import AlarmSettings
 from cosmic.app.configuration.network import NetworkSettings
 from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.daqco.core.settings import DaqcoSettings
@@ -42,6 +43,7 @@ class PlatformFile(StrictModel):
     application: dict[str, dict[str, object]] = Field(default_factory=dict)
     control: ControlSettings = ControlSettings()
     network: NetworkSettings = NetworkSettings()
+    alarms: AlarmSettings = AlarmSettings()
 
     @property
     def all_simulated(self) -> bool:

@@ -1,5 +1,6 @@
 """The list of alarms: when, why, what to do, and whether somebody has seen it."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -11,6 +12,8 @@ from PySide6.QtWidgets import QHBoxLayout, QTreeWidget, QTreeWidgetItem, QVBoxLa
 
 from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
+
+logger = logging.getLogger(__name__)
 
 MOST: Final = 200
 HEADS: Final = ("Time", "Level", "Cause", "What to do", "Seen")
@@ -88,6 +91,8 @@ class AlarmBook(QObject):
             return
         self.end(source)
         self._alarms.append(Alarm(source, level, cause, advice, self._now()))
+        grave = logging.ERROR if level is Level.CRITICAL else logging.WARNING
+        logger.log(grave, "Alarm, %s: %s. %s.", level, cause.rstrip("."), advice.rstrip("."))
         del self._alarms[:-MOST]
         self.changed.emit()
 
@@ -98,6 +103,9 @@ class AlarmBook(QObject):
     def acknowledge(self, index: int | None = None) -> None:
         """Note that somebody has seen one alarm, by its place in `alarms`, or all of them."""
         chosen = self.alarms if index is None else self.alarms[index : index + 1]
+        for each in chosen:
+            if not each.seen:
+                logger.info("Alarm acknowledged: %s.", each.cause.rstrip("."))
         self._change(
             lambda each: replace(each, seen=True) if any(each is one for one in chosen) else each
         )

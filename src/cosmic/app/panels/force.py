@@ -11,19 +11,22 @@ from typing import Final, TypeVar
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QPaintEvent, QPen
+from PySide6.QtGui import QAction, QActionGroup, QColor, QPaintEvent, QPen
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QLineEdit,
+    QMenu,
     QPushButton,
     QSizePolicy,
     QStackedWidget,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
 from cosmic.app.panels.curve_frame import CurveFrame
+from cosmic.app.panels.force_analysis import LowPass, RecentValues, SpectrumCurve
 from cosmic.daqco.api.daqco import Daqco, DaqLimit
 from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.core.chunk import DataChunk
@@ -62,6 +65,10 @@ TARE_SHARE: Final = 0.25
 LOW_PX: Final = 20 * STEP_PX
 """Below this height an axis has three numbers only."""
 _POINTS: Final = 4000
+BEFORE_S: Final = 3.0
+FILTERS_HZ: Final = (100.0, 30.0, 10.0, 3.0, 1.0)
+_ANALYSIS_LOOKS: Final = 5
+"""Statistics and spectrum are made anew at each so many read-outs."""
 _STILL_UM: Final = 0.05
 
 
@@ -205,6 +212,9 @@ class ForcePanel(QWidget):
         self._recent: deque[float] = deque(maxlen=max(1, round(MEAN_S * 1000.0)))
         self._recording = False
         self._error = ""
+        self._filter: LowPass | None = None
+        self._window = RecentValues()
+        self._looks = 0
         self._make_widgets()
         self._arrange()
         self._asking = Asking(daqco, self)
@@ -241,6 +251,12 @@ class ForcePanel(QWidget):
         self.curves = QStackedWidget()
         self.curves.addWidget(self.chart)
         self.curves.addWidget(self.over)
+        self.spectrum = SpectrumCurve(AXIS_PX)
+        self.curves.addWidget(self.spectrum)
+        self.statistics = named(ElidedLabel(), "forceStatistics")
+        self.statistics.setFont(number_font(11))
+        self.statistics.hide()
+        self._make_menu()
         self.by_time = self._curve_button("over time", 0)
         self.by_position = self._curve_button("over position", 1)
         self.by_time.setChecked(True)
@@ -256,6 +272,63 @@ class ForcePanel(QWidget):
         self.mark.setShortcut("Ctrl+M")
         self.mark.clicked.connect(self._on_mark)
         self.message = named(ElidedLabel(), "forceMessage")
+
+    def _make_menu(self) -> None:
+        self.more = styled(
+            named(tipped(QToolButton(), "Filter, statistics, spectrum"), "more"), "menu"
+        )
+        self.more.setText("⋯")
+        self.more.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(self.more)
+        self.before = QAction(f"Record also the {BEFORE_S:g} s before", menu)
+        self.numbers = QAction("Statistics of the last 10 s", menu)
+        for action in (self.before, self.numbers):
+            action.setCheckable(True)
+            menu.addAction(action)
+        self.numbers.toggled.connect(self.statistics.setVisible)
+        menu.addSeparator()
+        spectrum = menu.addAction("Spectrum")
+        spectrum.triggered.connect(self._on_spectrum)
+        filters = menu.addMenu("Filter what is shown")
+        self.filters = QActionGroup(filters)
+        for cut_hz in (0.0, *FILTERS_HZ):
+            action = filters.addAction(f"below {cut_hz:g} Hz" if cut_hz else "none")
+            action.setCheckable(True)
+            action.setChecked(not cut_hz)
+            action.setData(cut_hz)
+            self.filters.addAction(action)
+        self.filters.triggered.connect(self._on_filter)
+        self.more.setMenu(menu)
+
+    def _on_filter(self, action: QAction) -> None:
+        cut_hz = float(action.data())
+        self._filter = LowPass(cut_hz) if cut_hz else None
+
+    def _on_spectrum(self) -> None:
+        for button in (self.by_time, self.by_position):
+            button.setAutoExclusive(False)
+            button.setChecked(False)
+            button.setAutoExclusive(True)
+        self.curves.setCurrentWidget(self.spectrum)
+
+    def _show_analysis(self) -> None:
+        """Show statistics and spectrum, where they are seen."""
+        self._looks = (self._looks + 1) % _ANALYSIS_LOOKS
+        if self._looks or not self.isVisible():
+            return
+        if self.numbers.isChecked():
+            found = self._window.statistics()
+            if found is None:
+                self.statistics.set_text("too little was measured")
+            else:
+                self.statistics.set_text(
+                    f"{found.seconds:.0f} s: mean {found.mean:.2f}  sd {found.deviation:.3f}  "
+                    f"{found.low:.1f} to {found.high:.1f}"
+                )
+        if self.curves.currentWidget() is self.spectrum:
+            spectrum = self._window.spectrum()
+            if spectrum is not None:
+                self.spectrum.show_spectrum(*spectrum)
 
     def _curve_button(self, text: str, page: int) -> QPushButton:
         button = styled(push_button(text, f"Force {text}"), "narrow")
@@ -278,6 +351,7 @@ class ForcePanel(QWidget):
         row.setSpacing(0)
         row.addWidget(self.by_time, 1)
         row.addWidget(self.by_position, 1)
+        row.addWidget(self.more)
         buttons, row = tight_row(STEP_PX // 2)
         row.addWidget(self.record, 1)
         row.addWidget(self.mark)
@@ -293,6 +367,7 @@ class ForcePanel(QWidget):
         for widget in (head, self.bar, limit, which):
             column.addWidget(widget)
         column.addWidget(self.curves, 1)
+        column.addWidget(self.statistics)
         for widget in (names, buttons, self.message):
             column.addWidget(widget)
 
@@ -335,6 +410,8 @@ class ForcePanel(QWidget):
             self.chart.set_span(SPAN_S)
             self._show_ranges()
             self.over.name_force(display_unit(unit))
+            self.spectrum.name_force(display_unit(unit))
+            self._window = RecentValues()
             self.title.set_text(self._channel.upper())
             self.unit.setText(display_unit(unit))
         self._show_recording()
@@ -346,6 +423,10 @@ class ForcePanel(QWidget):
         if not mine:
             return
         self._heard_s = WALL.now_s()
+        for chunk in mine:
+            self._window.add(chunk)
+        if self._filter is not None:
+            mine = [self._filter.apply(chunk) for chunk in mine]
         for chunk in mine:
             self._recent.extend(chunk.values[0].tolist())
         self.chart.feed(mine)
@@ -407,6 +488,7 @@ class ForcePanel(QWidget):
         self.limit.set_text(self._limit_words(limit, value if fresh else None))
         if self._recording:
             self._show_recording()
+        self._show_analysis()
 
     def _limit_words(self, limit: DaqLimit | None, value: float | None) -> str:
         unit = display_unit(self._daqco.units.get(self._channel, ""))
@@ -484,9 +566,10 @@ class ForcePanel(QWidget):
             self._say(str(error), refused=True)
             return
         note = self.note.text().strip()
+        before_s = BEFORE_S if self.before.isChecked() else 0.0
 
         def begin() -> None:
-            self._daqco.start_recording(found.path)
+            self._daqco.start_recording(found.path, before_s=before_s)
             if note:
                 self._daqco.mark(f"note: {note}")
 

@@ -232,6 +232,8 @@ def _reduced(values: Values, piece: int) -> tuple[Values, Values, Values]:
 def _axis(recording: Recording, name: str, unit: str) -> Track:
     times, places, confidence = recording.positions(name)
     places[confidence == "unknown"] = np.nan
+    order = np.argsort(times, kind="stable")  # a moving axis is dated back to when it was read
+    times, places = times[order], places[order]
     return Track(name, unit, times, places, places, places)
 
 

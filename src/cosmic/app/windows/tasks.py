@@ -1,5 +1,6 @@
 """The operator's window by task: six workspaces around one picture, with coach and drawer."""
 
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -22,6 +23,7 @@ from cosmic.app.platform import Platform
 from cosmic.app.results.session_log import SessionLog
 from cosmic.app.results.sessions import SessionFolder
 from cosmic.app.rig import Rig
+from cosmic.app.windows.alarm_watch import AlarmWatch, Quantity, computer_quantities
 from cosmic.app.windows.fibre_menu import FibreOperations
 from cosmic.app.windows.picture_move import PictureMove
 from cosmic.app.windows.stage import SCENE_TITLE, Stage, column_of
@@ -165,6 +167,8 @@ class TaskLayout(QObject):
         self.force = ForcePanel(rig.daqco, gui, self.folder) if instruments.force else None
         self.results = ResultsPanel(self._folders, platform.policy, self._model)
         self.book = AlarmBook(self)
+        self._alarms = AlarmWatch(self.book, sound=platform.file.alarms.sound)
+        self._computer = computer_quantities(platform.file.alarms, self.folder.home)
         self._log: SessionLog | None = None
         self._add_panels()
         others = tuple(each.title for each in platform.others.values())
@@ -318,7 +322,40 @@ class TaskLayout(QObject):
         """Show everywhere that the stop is latched, and why; None: no longer."""
         self.tool.show_stopped(reason)
 
-    def _watch_clearance(self) -> None:
+    def _quantities(self) -> dict[str, Quantity]:
+        """Return what is watched by its value: forces with a limit, clearance, the computer."""
+        settings = self._platform.file.alarms
+        found = dict(self._computer)
+        clearance = self._window.top_bar.clearance
+        if clearance is not None:
+            distance_um, between = clearance.distance_um, " and ".join(clearance.bodies)
+            found["near"] = Quantity(
+                "near",
+                f"The clearance of {between}",
+                "µm",
+                settings.clearance_um,
+                "Move them apart",
+                lambda: distance_um,
+            )
+        for each in self._rig.daqco.limits if self.force is not None else ():
+            name, value = each.settings.channel, each.value
+            side = each.settings.high if value is None or value >= 0.0 else each.settings.low
+            if not each.settings.armed or each.crossed or not side or value is None:
+                continue
+            share = abs(value / side)
+            source = f"force {name}"
+            found[source] = Quantity(
+                source,
+                f"{name}, of its limit,",
+                "%",
+                settings.force,
+                "Move the tool back",
+                partial(float, share),
+                scale=100.0,
+            )
+        return found
+
+    def _watch_margin(self) -> None:
         clearance = self._window.top_bar.clearance
         if clearance is not None and closeness(clearance) == "margin":
             one, other = clearance.bodies
@@ -331,21 +368,23 @@ class TaskLayout(QObject):
         """Look at what raises alarms and is not told by itself."""
         self._show_move()
         self._picture_move.show_directions(self.stage.camera)
-        self._watch_clearance()
-        if self.force is None:
-            return
+        self._watch_margin()
+        self._alarms.look(self._quantities())
+        if self.force is not None:
+            self._watch_force()
+
+    def _watch_force(self) -> None:
         daqco, book = self._rig.daqco, self.book
-        crossed = [each for each in daqco.limits if each.crossed]
-        for each in crossed:
+        for each in daqco.limits:
             name = each.settings.channel
+            if not each.crossed:
+                book.end(f"limit {name}")
+                continue
             value = f" at {each.value:.0f}" if each.value is not None else ""
             advice = "Move the tool off, reset the stop, then reset the limit"
             book.raise_alarm(
                 f"limit {name}", Level.CRITICAL, f"{name} crossed its limit{value}", advice
             )
-        for each in daqco.limits:
-            if not each.crossed:
-                book.end(f"limit {each.settings.channel}")
         if daqco.problem:
             advice = "Check the board, then start the acquisition"
             book.raise_alarm("acquisition", Level.CRITICAL, daqco.problem, advice)

@@ -364,10 +364,17 @@ class Daqco(Declared):
         return self._application.directory
 
     @command(timeout_s=SLOW_S)
-    def start_recording(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write what is acquired to `path` until `stop_recording`.
+    def start_recording(
+        self, path: str | Path, *, overwrite: bool = False, before_s: float = 0.0
+    ) -> None:
+        """Write what is acquired to `path` until `stop_recording`, and what came just before.
 
         Where the boards are elsewhere the file lies there, and a relative path begins there.
+
+        Parameters
+        ----------
+        before_s : float
+            The recording begins so long before now, as far as so much was acquired; 0 to 5 s.
 
         Raises
         ------
@@ -376,8 +383,11 @@ class Daqco(Declared):
         RecordingError
             The name, the directory or the disk forbid it, or there is such a file and
             `overwrite` is False.
+        ConfigError
+            `before_s` is out of range.
         """
-        self._recorder.start(self._file(path, RECORDINGS), overwrite=overwrite)
+        path = self._file(path, RECORDINGS)
+        self._recorder.start(path, overwrite=overwrite, before_s=before_s)
 
     @command(timeout_s=SLOW_S)
     def stop_recording(self) -> None:

@@ -2,11 +2,12 @@
 
 import logging
 from abc import abstractmethod
+from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from threading import RLock
+from threading import Lock, RLock
 from typing import Final, Protocol
 
 from PySide6.QtCore import Qt
@@ -28,7 +29,7 @@ from cosmic.daqco.core.udaq_buffer import UDaqBuffer
 from cosmic.daqco.core.unclosed_file import is_unclosed
 from cosmic.daqco.hw.board_group import ClockAgreement
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.events import Event
 from cosmic.frame.failure import FailurePolicy
 
@@ -36,6 +37,11 @@ logger = logging.getLogger(__name__)
 
 POSITIONS_S: Final = 0.05
 """How often the positions of all axes are written, in wall time."""
+
+MOST_BEFORE_S: Final = 5.0
+"""So much of what was acquired is kept for a recording that begins."""
+
+MOST_BEFORE_BYTES: Final = 32 * 1024 * 1024
 
 PositionSource = Callable[[], Iterable[AxisPosition]]
 
@@ -112,6 +118,40 @@ class Acquisition(Protocol):
         """Call `check(settings)` before they come into force; what it raises forbids them."""
 
 
+class SamplesBefore:
+    """Keeps the newest seconds of what is acquired, with the positions of that time."""
+
+    def __init__(self) -> None:
+        self._kept: deque[tuple[DataChunk, tuple[AxisPosition, ...]]] = deque()
+        self._bytes = 0
+
+    def add(self, chunk: DataChunk, positions: tuple[AxisPosition, ...]) -> None:
+        """Keep a chunk, and forget what is too old; another acquisition begins anew."""
+        kept = self._kept
+        if kept and not _follows(kept[-1][0], chunk):
+            kept.clear()
+            self._bytes = 0
+        kept.append((chunk, positions))
+        self._bytes += chunk.nbytes
+        oldest_s = chunk.end_time_s - MOST_BEFORE_S
+        while kept and (kept[0][0].end_time_s <= oldest_s or self._bytes > MOST_BEFORE_BYTES):
+            self._bytes -= kept.popleft()[0].nbytes
+
+    def start_s(self, now_s: float, before_s: float) -> float:
+        """Return when a recording begins that takes up to `before_s` along; platform time."""
+        chosen = self.since(now_s - before_s) if before_s else ()
+        return next((chunk.time_s for chunk, _ in chosen), now_s)
+
+    def since(self, start_s: float) -> tuple[tuple[DataChunk, tuple[AxisPosition, ...]], ...]:
+        """Return whole chunks from a platform time on, oldest first."""
+        return tuple(each for each in tuple(self._kept) if each[0].time_s >= start_s)
+
+
+def _follows(before: DataChunk, after: DataChunk) -> bool:
+    alike = (before.channels, before.rate_hz) == (after.channels, after.rate_hz)
+    return alike and after.first_sample >= before.first_sample + before.samples
+
+
 class Recorder:
     """One recording at a time of what an application acquires; any thread.
 
@@ -138,13 +178,15 @@ class Recorder:
         self._software, self._configuration = software, configuration
         self._lock = RLock()
         self._writer: UDaqFileWriter | None = None
-        self._unsubscribe: Callable[[], None] | None = None
+        self._before = SamplesBefore()
+        self._handing_over = Lock()
         self._stats: RecordingStats | None = None
         self._failure = ""
         self._left_behind: list[UDaqFileWriter] = []
         self._positions_due_s = 0.0
         self._changed: Event[[]] = Event()
         self.position_source: PositionSource | None = None
+        application.buffer.subscribe(self._on_chunk)
         application.guard.subscribe(self._on_crossing)
         application.guard.on_note(self._on_limit_note)
         application.before_change(self._forbid)
@@ -168,31 +210,40 @@ class Recorder:
             failure=self._failure,
         )
 
-    def start(self, path: Path, *, overwrite: bool = False) -> None:
-        """Begin to write what is acquired to `path`.
+    def start(self, path: Path, *, overwrite: bool = False, before_s: float = 0.0) -> None:
+        """Begin to write what is acquired to `path`, and what came up to `before_s` ago.
 
         Raises
         ------
+        ConfigError
+            `before_s` is not from 0 to `MOST_BEFORE_S`.
         NotAvailable
             Nothing is acquired, or a recording runs already.
         RecordingError
             The name, the directory or the disk forbid it, or there is such a file and
             `overwrite` is False.
         """
+        if not 0.0 <= before_s <= MOST_BEFORE_S:
+            raise ConfigError(f"before_s is {before_s:g}; give 0 to {MOST_BEFORE_S:g} s")
         with self._lock:
             if self.state.active:
                 raise NotAvailable(f"{self.state.path} is being recorded; stop it first")
             self._close()
             if not self._application.running:
                 raise NotAvailable("nothing is acquired; start the acquisition first")
-            writer = UDaqFileWriter(path, self._header(), self._policy, overwrite=overwrite)
+            header = self._header(before_s)
+            writer = UDaqFileWriter(path, header, self._policy, overwrite=overwrite)
             direct = Qt.ConnectionType.DirectConnection
             writer.recorded.connect(self._on_recorded, direct)
             writer.failed.connect(self._on_failed, direct)
-            self._failure, self._stats, self._writer = "", None, writer
+            self._failure, self._stats = "", None
             self._note = None if self._notes is None else self._notes.note(writer.path)
             writer.start()
-            self._unsubscribe = self._application.buffer.subscribe(self._write)
+            with self._handing_over:  # no chunk twice, and none between
+                for chunk, positions in self._before.since(header.start_s):
+                    self._put(writer, chunk)
+                    writer.add_positions(positions)
+                self._writer = writer
             for each in self._application.clock_agreement:
                 self.note("clocks", each.text)
         logger.info("recording to %s", writer.path)
@@ -206,9 +257,6 @@ class Recorder:
     def _close(self) -> None:
         with self._lock:
             writer, self._writer = self._writer, None
-            if self._unsubscribe is not None:
-                self._unsubscribe()
-                self._unsubscribe = None
             if writer is None:
                 return
             writer.request_end()
@@ -242,8 +290,11 @@ class Recorder:
         """Write an event of any kind with the present time; nothing where nothing is recorded."""
         self._add_event(kind, text, self._application.clock.now_s(), channel=channel)
 
-    def _header(self) -> RecordingHeader:
+    def _header(self, before_s: float) -> RecordingHeader:
         application = self._application
+        now_s, now_utc = application.clock.now_s(), datetime.now(UTC)
+        start_s = self._before.start_s(now_s, before_s)
+        passed_s = (now_s - start_s) / (application.clock.rate or 1.0)
         channels = tuple(each for each in application.settings.channel if each.active)
         scales = application.scales()
         positions = () if self.position_source is None else self.position_source()
@@ -251,8 +302,8 @@ class Recorder:
             rate_hz=application.rate_hz,
             channels=channels,
             scales=tuple(scales[each.name] for each in channels),
-            start_utc=datetime.now(UTC),
-            start_s=application.clock.now_s(),
+            start_utc=now_utc - timedelta(seconds=passed_s),
+            start_s=start_s,
             software=self._software,
             configuration=self._configuration,
             axes=tuple((each.axis, each.unit) for each in positions),
@@ -266,17 +317,24 @@ class Recorder:
 
     # What is written
 
-    def _write(self, chunk: DataChunk) -> None:
-        writer = self._writer
-        if writer is None:
-            return
+    def _on_chunk(self, chunk: DataChunk) -> None:
+        """Write a chunk, or keep it for a recording that may begin; acquisition thread."""
+        now_s = WALL.now_s()
+        positions: tuple[AxisPosition, ...] = ()
+        if self.position_source is not None and now_s >= self._positions_due_s:
+            self._positions_due_s = now_s + POSITIONS_S
+            positions = tuple(self.position_source())
+        with self._handing_over:
+            self._before.add(chunk, positions)
+            writer = self._writer
+            if writer is not None:
+                self._put(writer, chunk)
+                writer.add_positions(positions)
+
+    def _put(self, writer: UDaqFileWriter, chunk: DataChunk) -> None:
         writer.put(chunk)
         for exposure in self._application.exposures_in(chunk):
             writer.add_exposure(exposure)
-        now_s = WALL.now_s()
-        if self.position_source is not None and now_s >= self._positions_due_s:
-            self._positions_due_s = now_s + POSITIONS_S
-            writer.add_positions(self.position_source())
 
     def _on_crossing(self, crossing: Crossing) -> None:
         self._add_event(

@@ -10,6 +10,7 @@ from PySide6.QtGui import QIcon, QImage, QPixmap
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
+    QHeaderView,
     QLineEdit,
     QTreeWidget,
     QTreeWidgetItem,
@@ -96,6 +97,10 @@ class SessionList(QWidget):
         self.list.setHeaderLabels(["Recording", "Size"])
         self.list.setIconSize(THUMBNAIL)
         self.list.setIndentation(STEP_PX)
+        head = self.list.header()
+        head.setStretchLastSection(False)
+        head.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        head.setSectionResizeMode(1, QHeaderView.ResizeMode.ResizeToContents)
         self.list.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.list.setToolTip("Ctrl and a click choose others to compare with the first")
         self.list.itemSelectionChanged.connect(self._on_selection)
@@ -180,7 +185,6 @@ class SessionList(QWidget):
             parent.setFirstColumnSpanned(True)
             for each in items:
                 self._add(parent, each, chosen=each.path in chosen)
-        self.list.setColumnWidth(0, max(24 * STEP_PX, self.list.viewport().width() - 9 * STEP_PX))
         self.list.blockSignals(False)
         if self._wanted is not None:
             self._wanted = None

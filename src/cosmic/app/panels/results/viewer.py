@@ -11,6 +11,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QComboBox,
     QHBoxLayout,
+    QHeaderView,
     QLabel,
     QPushButton,
     QSlider,
@@ -122,7 +123,8 @@ class ResultViewer(QWidget):
         self.log = named(QTreeWidget(), "resultsLog")
         self.log.setHeaderLabels(["s", "What happened"])
         self.log.setRootIsDecorated(False)
-        self.log.setColumnWidth(0, 7 * STEP_PX)
+        self.log.header().setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
+        self.log.setMinimumWidth(18 * STEP_PX)
         self.log.itemClicked.connect(self._on_line)
 
     @staticmethod
@@ -136,12 +138,14 @@ class ResultViewer(QWidget):
         self._upper.setStretchFactor(0, 3)
         self._upper.setStretchFactor(1, 1)
         self._upper.setChildrenCollapsible(False)
+        self._upper.setSizes([3000, 1000])
         self.split = QSplitter(Qt.Orientation.Vertical)
         self.split.addWidget(self._upper)
         self.split.addWidget(self.curves)
         self.split.setStretchFactor(0, 1)
         self.split.setStretchFactor(1, 1)
         self.split.setChildrenCollapsible(False)
+        self.split.setSizes([1000, 1000])
         self.curves.setMinimumHeight(14 * STEP_PX)
         row = QHBoxLayout()
         row.setSpacing(STEP_PX // 2)
@@ -280,7 +284,7 @@ class ResultViewer(QWidget):
             for each in first.moved[:3]
             if np.isfinite(each.at(now_s))
         ]
-        self.moment.set_text("   ".join(words))
+        self.moment.set_text(",  ".join(words))
         self._show_line(now_s)
 
     def _on_slider(self, value: int) -> None:
