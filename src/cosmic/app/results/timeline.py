@@ -20,7 +20,7 @@ Values = npt.NDArray[np.float64]
 MOST_SAMPLES: Final = 400_000
 """Of a channel, kept in memory; of longer recordings the means of as many pieces."""
 BLOCK: Final = 1_000_000
-CLOCKS_AGREE_S: Final = 5.0
+CLOCKS_AGREE_S: Final = 30.0
 """Two recordings were made together where their clocks differ by less from the computer's."""
 MOVED: Final = {"um": 0.5, "deg": 0.05}
 """An axis that went less far did not move."""

@@ -1,0 +1,267 @@
+"""Makes the images of the pages anew: ``python docs/make_images.py [NAME...]``, all without a name.
+
+Each scene opens the window over a simulated platform, does what its page describes, and saves what
+is seen into docs/images. Look at every image before you commit it.
+"""
+
+import os
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+from PySide6.QtCore import QSettings
+from PySide6.QtWidgets import QApplication
+
+from cosmic.app.platform import build_platform
+from cosmic.app.rig import Rig
+from cosmic.app.windows.operator_window import OperatorWindow
+from cosmic.app.windows.tasks import HANDLE, LOOK, MEASURE, SET_UP, TaskLayout
+from cosmic.daqco.gui.main_widget import make_daqco_gui
+from cosmic.frame.log import RingBufferHandler, set_up_logging
+from cosmic.frame.threads import declare_gui_thread
+from cosmic.mico.gui.mico_widget import make_mico_gui
+from cosmic.vico.gui.vico_gui import make_vico_gui
+
+IMAGES: Final = Path(__file__).parent / "images"
+SIZE: Final = (1366, 768)
+LONGEST_S: Final = 120.0
+
+
+class Scene:
+    """A window over a simulated platform, and what a scene needs of it."""
+
+    def __init__(self, app: QApplication, folder: Path, *, cold: bool = False) -> None:
+        self._app = app
+        ring = RingBufferHandler()
+        self._undo = set_up_logging(ring)
+        platform = build_platform(
+            None,
+            applications=("mico", "daqco", "vico"),
+            world="plain",
+            cold=cold,
+            mico_gui=make_mico_gui,
+            daqco_gui=make_daqco_gui,
+            vico_gui=make_vico_gui,
+        )
+        settings = QSettings(str(folder / "window.ini"), QSettings.Format.IniFormat)
+        self.window = OperatorWindow(platform, settings, ring)
+        self.rig = Rig(platform)
+        self.folder = folder
+        self.window.resize(*SIZE)
+        self.window.show()
+        self.window.resize(*SIZE)
+        self.window.open_hardware()
+        self.until(lambda: self.rig.mico.ready)
+        self.wait(2.0)
+
+    @property
+    def tasks(self) -> TaskLayout:
+        """What the workspaces are made of."""
+        if self.window.tasks is None:
+            raise RuntimeError("the window has no workspaces")
+        return self.window.tasks
+
+    def choose(self, workspace: str) -> None:
+        """Show a workspace."""
+        if self.window.workspaces is not None:
+            self.window.workspaces.choose(workspace)
+        self.wait(1.0)
+
+    def wait(self, seconds: float) -> None:
+        """Let the window live for a while."""
+        ends = time.monotonic() + seconds
+        while time.monotonic() < ends:
+            self._app.processEvents()
+            threading.Event().wait(0.005)
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        """Let the window live until something is so."""
+        ends = time.monotonic() + LONGEST_S
+        while not condition():
+            if time.monotonic() > ends:
+                raise TimeoutError("what a scene waits for did not happen")
+            self.wait(0.02)
+
+    def behind(self, action: Callable[[], object]) -> None:
+        """Do what a script does, which blocks, while the window lives."""
+        thread = threading.Thread(target=action)
+        thread.start()
+        self.until(lambda: not thread.is_alive())
+
+    def save(self, name: str) -> None:
+        """Save what is seen."""
+        self.wait(0.5)
+        self.window.grab().save(str(IMAGES / f"{name}.png"))
+
+    def close(self) -> None:
+        """Close the window."""
+        self.window.close()
+        self._undo()
+
+
+def operator_window(scene: Scene) -> None:
+    """Handle, with the image and the force."""
+    scene.choose(LOOK)
+    scene.wait(2.0)
+    scene.choose(HANDLE)
+    scene.wait(2.0)
+    scene.save("operator-window")
+
+
+def window_set_up(scene: Scene) -> None:
+    """All axes as a table."""
+    scene.choose(SET_UP)
+    scene.save("window-set-up")
+
+
+def window_measure(scene: Scene) -> None:
+    """Ten seconds of force."""
+    scene.choose(LOOK)
+    scene.wait(1.0)
+    scene.choose(MEASURE)
+    scene.wait(10.0)
+    scene.save("window-measure")
+
+
+def _before_the_probe(scene: Scene) -> None:
+    """Bring the fibre of the left gripper in front of the probe."""
+
+    def bring() -> None:
+        scene.rig.mico.move({"left.z": -800.0, "left.x": 3600.0})
+        scene.rig.mico["probe.y"].move_to(-4950.0)
+
+    scene.behind(bring)
+
+
+def window_results(scene: Scene) -> None:
+    """Show a push that was recorded, with its images."""
+    _before_the_probe(scene)
+    scene.choose(MEASURE)
+    home = scene.folder / "sessions"
+    scene.tasks.folder.home = home
+    folder = home / "2026-11-23_10-12"
+    folder.mkdir(parents=True)
+    (folder / "session.toml").write_text('sample = "pine kraft"\noperator = "A. Lab"\n')
+    rig = scene.rig
+    log = scene.tasks.folder.on_made
+    if log is not None:
+        log(folder)
+
+    def push() -> None:
+        camera = rig.vico.camera()
+        camera.next_image(20.0)
+        probe = rig.mico["probe.y"]
+        probe.set_closed_loop_frequency(30)
+        rig.daqco.start_recording(folder / "push.h5", before_s=1.0)
+        camera.record(folder / "push-images")
+        probe.move_to(-5050.0)
+        rig.daqco.mark("turned")
+        probe.move_to(-4950.0)
+        camera.stop_recording(wait=True)
+        rig.daqco.stop_recording()
+
+    scene.behind(push)
+    results = scene.tasks.results
+    scene.choose("Results")
+    results.sessions.show_file(folder / "push.h5")
+    scene.until(lambda: bool(results.viewer.timelines))
+    results.viewer.curves.cursors.setRegion((2.0, 3.0))
+    results.viewer.show_moment(2.5)
+    scene.wait(2.0)
+    scene.save("window-results")
+
+
+def initialise(scene: Scene) -> None:
+    """Show the second step of the initialisation."""
+    scene.choose(SET_UP)
+    gui = scene.window.mico_gui
+    if gui is None:
+        raise RuntimeError("the window has no axes")
+    running = scene.rig.mico.initialise(wait=False)
+    scene.until(lambda: running.progress.fraction >= 0.1)
+    scene.save("initialise")
+    running.cancel()
+    scene.wait(1.0)
+
+
+def measure_a_force(scene: Scene) -> None:
+    """Show how the limit stopped the probe."""
+    _before_the_probe(scene)
+    scene.choose(LOOK)
+    scene.choose(MEASURE)
+    scene.rig.daqco.arm_limit("force", high=140.0, hysteresis=10.0)
+    scene.rig.mico["probe.y"].set_closed_loop_frequency(30)
+    scene.rig.mico["probe.y"].move_to(-5200.0, wait=False)
+    scene.until(lambda: scene.rig.daqco.limits[0].crossed)
+    scene.wait(1.5)
+    scene.save("measure-a-force")
+
+
+def scene_refused(scene: Scene) -> None:
+    """Show a refused move, and where it would have led."""
+    scene.choose(HANDLE)
+    scene.window.raise_panel("Scene")
+    tool = scene.tasks.tool
+    tool.step.setText("4000")
+    scene.wait(1.0)
+    tool.pad["z", -1].click()
+    scene.until(tool.nearest.isVisible)
+    scene.wait(1.0)
+    scene.save("scene-refused")
+
+
+def steer_with_a_gamepad(scene: Scene) -> None:
+    """Show what a hand feels of the fibre."""
+    _before_the_probe(scene)
+    scene.choose(HANDLE)
+    scene.window.raise_panel("Teleoperation")
+    steering = scene.rig.mico.teleoperation
+    steering.start("haptic:sim", "probe, haptic")
+    scene.wait(0.5)
+    move_hand = getattr(steering.device, "move_hand", None)  # the simulated device has a hand
+    if callable(move_hand):
+        move_hand(y=-0.6)
+    scene.wait(2.5)
+    scene.save("steer-with-a-gamepad")
+    steering.stop()
+
+
+SCENES: Final[dict[str, Callable[[Scene], None]]] = {
+    "operator-window": operator_window,
+    "window-set-up": window_set_up,
+    "window-measure": window_measure,
+    "window-results": window_results,
+    "initialise": initialise,
+    "measure-a-force": measure_a_force,
+    "scene-refused": scene_refused,
+    "steer-with-a-gamepad": steer_with_a_gamepad,
+}
+
+
+def main(names: list[str]) -> int:
+    """Make the images of these scenes; all without a name."""
+    unknown = [name for name in names if name not in SCENES]
+    if unknown:
+        sys.stderr.write(f"no scene {unknown[0]!r}; there are {', '.join(SCENES)}\n")
+        return 2
+    app = QApplication([])
+    end = declare_gui_thread()
+    for name in names or list(SCENES):
+        with tempfile.TemporaryDirectory() as folder:
+            scene = Scene(app, Path(folder), cold=name == "initialise")
+            try:
+                SCENES[name](scene)
+            finally:
+                scene.close()
+    end()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
