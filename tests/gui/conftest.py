@@ -11,6 +11,7 @@ from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
 from cosmic.app.configuration import platform_file
+from cosmic.app.windows import alarm_watch
 from cosmic.mico.core.collision import collision_manager, scene_loader
 from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
 from cosmic.mico.core.collision.clear_travel import clear_travel
@@ -89,4 +90,6 @@ def quick_platform(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Have windows start quickly; the gate's process has tests of its own."""
     monkeypatch.setattr(collision_manager, "GateProcess", InProcess)
     monkeypatch.setattr(scene_loader, "load_scene", _cached)
+    # A computer that runs tests is busy; the alarm has tests of its own.
+    monkeypatch.setattr(alarm_watch, "processor_load", lambda: None)
     yield

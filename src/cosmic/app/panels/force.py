@@ -275,8 +275,9 @@ class ForcePanel(QWidget):
 
     def _make_menu(self) -> None:
         self.more = styled(
-            named(tipped(QToolButton(), "Filter, statistics, spectrum"), "more"), "menu"
+            named(tipped(QToolButton(), "Filter, statistics, spectrum"), "more"), "tool menu"
         )
+        self.more.setFixedWidth(20)
         self.more.setText("⋯")
         self.more.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         menu = QMenu(self.more)
