@@ -393,7 +393,7 @@ def test_a_trajectory_is_stepped_watched_and_goes_on_where_it_failed(mico: Mico)
 
 
 def test_what_another_program_plays_is_seen_and_can_be_paused(hosted: HostedMico) -> None:
-    text = f"{HEAD}wait 5 s\nleft.x to 30 um\n"
+    text = f"{HEAD}wait 200 s\nleft.x to 30 um\n"
     player = hosted.mico.trajectories.run(hosted.mico.trajectories.parse(text), wait=False)
     with remote_mico(hosted, "memory", takes_lease=False) as (mico, _, _):
         wait_for(lambda: mico.trajectories.player is not None)

@@ -58,7 +58,7 @@ class Proxied(Declared):
     @property
     @override
     def refused(self) -> str:
-        return self._link.refused(self._address)
+        return self._link.commands.refused(self._address)
 
     @property
     @override
@@ -68,7 +68,7 @@ class Proxied(Declared):
     @property
     @override
     def moves_remotely(self) -> bool:
-        return self._link.moves
+        return self._link.commands.moves
 
     @override
     @checked
@@ -84,7 +84,7 @@ class Proxied(Declared):
         if may_wait_here():
             do_and_report(action, on_result)
         else:
-            self._link.aside(action, on_result)
+            self._link.commands.aside(action, on_result)
 
     def _part(self, name: str, key: str | None = None) -> "Proxied":
         found = self._parts.get((name, key))
@@ -140,7 +140,7 @@ def _command(original: Callable[..., object], declared: CommandDeclaration) -> o
     @wraps(original)
     def call(self: Proxied, /, *args: object, **kwargs: object) -> object:
         _, *given = signature.bind(self, *args, **kwargs).arguments.items()
-        return self._link.call(self._address, declared, dict(given))
+        return self._link.commands.call(self._address, declared, dict(given))
 
     return checked(call) if hasattr(original, "__wrapped__") else call
 
