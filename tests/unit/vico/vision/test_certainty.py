@@ -1,0 +1,68 @@
+"""What is certain is one whole fibre; what is whole is mostly certain."""
+
+import numpy as np
+import pytest
+from benchmarks.certainty import cases, drawn_cases, split, tellable, wrong
+from benchmarks.fibre_pairs import Kind, draw
+
+from cosmic.vico.api import find_fibres
+from cosmic.vico.core.vision.certainty import CERTAIN, Signs, probability
+from unit.vico.vision.drawn_fibres import arc, drawn_image, strip
+
+PAIRS = (Kind.TOUCHING, Kind.OVERLAPPING, Kind.GAP)
+
+
+def test_whole_fibres_stay_certain_and_their_interval_holds_the_length() -> None:
+    found = [drawn_cases(draw(Kind.SINGLE, seed, jpeg=False)) for seed in range(200, 224)]
+    certain = [case for each in found for case in each if case.fibre.certain]
+    assert len(certain) >= 20
+    assert all(case.right for case in certain)
+    inside = [
+        case.fibre.length_interval_px[0] <= case.length_px <= case.fibre.length_interval_px[1]
+        for case in certain
+    ]
+    assert sum(inside) >= 0.85 * len(certain)
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+def test_pairs_that_pixels_tell_apart_are_not_one_certain_fibre(kind: Kind) -> None:
+    drawn = [one for seed in range(300, 316) if tellable(one := draw(kind, seed))]
+    assert len(drawn) >= 5
+    assert sum(wrong(drawn_cases(one)) for one in drawn) == 0
+
+
+def test_a_gap_of_half_a_width_is_found_as_two_drawn_in_another_way() -> None:
+    both = gaps = 0
+    for seed in range(1, 13, 2):
+        image, lines, gap = split(seed)
+        found = cases(find_fibres(image), lines)
+        assert wrong(found) == 0
+        if gap >= 0.5:
+            gaps += 1
+            both += sum(case.right for case in found) == 2
+    assert both >= 0.8 * gaps
+
+
+def test_a_fibre_that_goes_on_thinner_is_not_certain() -> None:
+    drawn = [drawn_cases(draw(Kind.GOES_ON, seed)) for seed in range(400, 412)]
+    assert sum(wrong(each) for each in drawn) == 0
+
+
+def test_what_goes_on_faintly_beyond_an_end_is_seen() -> None:
+    line = arc((60.0, 200.0), 0.0, 250.0, 0.0)
+    image = drawn_image([line], [12.0], noise=2.0).astype(np.float32)
+    whole = find_fibres(image.astype(np.uint8))[0]
+    assert whole.certain
+    image -= 14.0 * strip(image.shape[:2], arc((310.0, 200.0), 0.2, 200.0, 0.0), 4.0)
+    part = next(
+        each for each in find_fibres(image.astype(np.uint8)) if abs(each.length_px - 250.0) < 20.0
+    )
+    assert not part.certain
+    assert part.probability < whole.probability
+
+
+def test_a_sign_that_becomes_clearer_lowers_the_probability() -> None:
+    values = [probability(Signs(soft=level, goes_on=level), []) for level in (0.0, 0.5, 0.8, 1.2)]
+    assert values == sorted(values, reverse=True)
+    assert values[0] >= CERTAIN > values[-1]
+    assert probability(Signs(), ["the image's border cuts it off"]) == 0.0
