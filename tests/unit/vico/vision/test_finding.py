@@ -73,6 +73,12 @@ def test_two_dark_lines_with_ground_between_them_are_doubted() -> None:
     assert not certain(drawn_image([BOW, beside], [7.0, 7.0]))
 
 
+@pytest.mark.parametrize("apart", [10.0, 12.0])
+def test_ground_between_two_fibres_is_no_hollow(apart: float) -> None:
+    beside = [arc((80.0, y), 0.0, 400.0, 0.0) for y in (200.0, 200.0 + apart)]
+    assert not certain(drawn_image(beside, [7.0, 7.0]))
+
+
 def test_a_fibre_that_crosses_itself_is_followed_through() -> None:
     fibre = only(drawn_image([LOOP], [9.0]))
     assert fibre.certain, fibre.doubts

@@ -39,6 +39,8 @@ MOST_FORKS = 400
 SLENDER = 5.0
 LEAST_PX = 12.0
 LEAST_OF_IMAGE = 0.025
+# Lighter inside, it is ground between two fibres and no hollow.
+MOST_HOLLOW = 0.8
 # More cannot be told apart in time, nor in a network at all.
 MOST_STRANDS = 96
 
@@ -284,6 +286,8 @@ def checked_fibres(
     for index, (strand, course) in enumerate(courses):
         signs = certainty.signs_of(scene, course, explained)
         doubts = [*strand.doubts, *checks.doubts_of(course, scene.step), *signs.doubts]
+        if sections[index].hollow > MOST_HOLLOW:
+            doubts.append(checks.PARTED)
         if touches_border(scene, course):
             doubts.append(EndKind.BORDER.value)
         if crowd:

@@ -55,6 +55,8 @@ class Section:
         section tells it.
     leaning : float
         By how much the width changes with that logarithm.
+    hollow : float
+        Light in the hollow, from the walls' (0) to the ground's (1), less its deviation.
     """
 
     width_px: float
@@ -62,6 +64,7 @@ class Section:
     blur_ln: float
     blur_ln_std: float
     leaning: float
+    hollow: float = 0.0
 
     def with_blur(self, blur_ln: float, std: float) -> "Section":
         """Return the section in the light of what else is known of the blur."""
@@ -225,6 +228,7 @@ def _section(found: _At, count: int, width: float) -> Section:
         blur_ln=blur,
         blur_ln_std=math.sqrt(float(spread[BLUR, BLUR])),
         leaning=2.0 * float(spread[HALF, BLUR] / spread[BLUR, BLUR]),
+        hollow=float(found.state[DEPTH]) - math.sqrt(float(spread[DEPTH, DEPTH])),
     )
 
 
