@@ -118,9 +118,12 @@ class Watch(threading.Thread):
     def _march(self, until_s: float) -> None:
         while self._at_s < until_s:
             at_s = self._at_s
-            for name, stage in self._stages.items():
-                if at_s < stage.paths[0].times_s[0] and len(stage.paths) > 1:
-                    self.found.unseen.add(name)
+            lost = self._lost_sight_of(at_s)
+            if lost:
+                # Before, nobody knows where it was: with others of that time it means nothing.
+                self.found.unseen.update(lost)
+                self._at_s = min(until_s, max(lost.values()))
+                continue
             legs = {name: each.leg_then(at_s) for name, each in self._stages.items()}
             knot_s = min(end_s for _, end_s in legs.values())
             # Straight on until the next knot of any stage, a few degrees or a quarter mm.
@@ -129,6 +132,12 @@ class Watch(threading.Thread):
             self._at_s = min(until_s, max(at_s + 1e-5, min(knot_s, at_s + longest_s)))
             self._judge(at_s, {name: speed for name, (speed, _) in legs.items()})
             self.found.behind_s = max(self.found.behind_s, self._clock.now_s() - self._at_s)
+
+    def _lost_sight_of(self, at_s: float) -> dict[str, float]:
+        """Return the stages that have forgotten where they were, and from when on they know."""
+        kept = {name: each.paths for name, each in self._stages.items()}
+        since = {name: paths[0].times_s[0] for name, paths in kept.items() if len(paths) > 1}
+        return {name: from_s for name, from_s in since.items() if at_s < from_s}
 
     def _judge(self, at_s: float, speeds: Mapping[str, float]) -> None:
         found = self.found

@@ -126,6 +126,8 @@ def complaint(call: Call, name: str, odd: object, error: BaseException | None) -
         return ""
     shown = f"{call.where}({name}={repr(odd)[:40]}): {type(error).__name__}: {str(error)[:110]}"
     if isinstance(error, TypeError):
-        named = call.where.endswith("=") or name in str(error)
+        # What subscribes is called so everywhere, whatever its parameter is.
+        known = (name, "subscriber") if name == "listener" else (name,)
+        named = call.where.endswith("=") or any(each in str(error) for each in known)
         return "" if named else shown
     return shown

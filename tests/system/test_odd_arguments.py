@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import pytest
@@ -104,6 +104,44 @@ def test_odd_arguments_are_named_and_break_nothing(
             if found := complaint(call, parameter, odd, error):
                 wrong[found] = None
     rig.daqco.stop_recording()
+    assert not wrong, "\n".join(wrong)
+    assert tries > 0
+
+
+HANDLES: dict[str, Callable[[cosmic.Rig], object]] = {
+    "loop": lambda rig: rig.control.hold_force("force", "probe.y", 50.0, direction=-1),
+    "jog": lambda rig: rig.mico["left.x"].jog(1),
+    "movement": lambda rig: rig.mico["left.x"].move_by(5.0, wait=False),
+    "group": lambda rig: rig.mico.move_by({"left.x": 5.0, "left.y": 5.0}, wait=False),
+    "player": lambda rig: rig.mico.trajectories.run(
+        rig.mico.trajectories.parse(f"{HEAD}left.x to 40 um\nleft.x to 60 um\n"), wait=False
+    ),
+    "lens task": lambda rig: rig.vico.lens.home() if rig.vico.lens else None,
+    "campaign": lambda rig: rig.campaign("quick", "campaign"),
+}
+INSIDE_ONLY: Final = {"of", "followed"}
+"""They make such a handle from what lies inside."""
+WAITS: Final = {"wait", "exception", "result", "sent_result"}
+"""Of what goes on for ever they would wait for ever, as they should."""
+
+
+@pytest.mark.parametrize("name", HANDLES)
+def test_odd_arguments_of_what_runs_are_named_and_break_nothing(
+    rig: cosmic.Rig, sensible: dict[str, object], name: str
+) -> None:
+    rig.reset_stop()
+    handle = HANDLES[name](rig)
+    given = sensible | {"wait_settled.timeout_s": 0.01, "seconds": 0.1, "fraction": 0.5}
+    wrong: dict[str, None] = {}
+    tries = 0
+    left_out = LEFT_OUT | INSIDE_ONLY | (WAITS if name in ("loop", "jog", "campaign") else set())
+    for call in calls_of(name, handle, given, left_out):
+        for parameter, odd, error in tried(call):
+            tries += 1
+            if found := complaint(call, parameter, odd, error):
+                wrong[found] = None
+    rig.stop("the test")
+    rig.reset_stop()
     assert not wrong, "\n".join(wrong)
     assert tries > 0
 

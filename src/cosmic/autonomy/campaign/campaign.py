@@ -265,6 +265,7 @@ class Campaign:
 
     def abort(self, reason: str = "ended by the operator") -> None:
         """End it at once: what moves is cancelled, then it is made safe; returns at once."""
+        reason = str(reason) or "ended without a reason"  # whatever is given, it ends
         with self._changed:
             if self._phase in OVER:
                 return

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
+from cosmic.frame.arguments import checked
 from cosmic.mico.core.motion.movement import Movement
 
 
@@ -40,6 +41,7 @@ class Jogging:
         """True when it has ended: let go, at a limit, stopped or refused."""
         return self._movement.done
 
+    @checked
     def renew(self, velocity: float | None = None) -> None:
         """Keep it alive; call it at least every 0.1 s. Any thread, and it does not wait.
 
