@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
+from datetime import datetime
 from importlib import import_module
 from pathlib import Path
 from typing import Final
@@ -90,6 +91,21 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _add_audit(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    audit = commands.add_parser("audit", help="list who commanded what, and with which verdict")
+    audit.add_argument("file", type=Path, nargs="?", metavar="FILE", help="default: this computer")
+    for name, what in (
+        ("who", "client, or what commanded it here"),
+        ("door", "local, gate, station, http or epics"),
+        ("what", "the command"),
+        ("verdict", "begun, done, refused or failed"),
+        ("why", "the reason"),
+    ):
+        audit.add_argument(f"--{name}", metavar="TEXT", help=f"only where it is in: {what}")
+    audit.add_argument("--since", type=_moment, metavar="TIME", help="such as 2026-11-23T08:00")
+    audit.add_argument("--json", action="store_true", help="lines of JSON, for programs")
+
+
 def _add_file_commands(
     commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
 ) -> None:
@@ -142,6 +158,7 @@ def _add_file_commands(
     recompute.add_argument(
         "--apply", action="store_true", help="put the new values into record, report and table"
     )
+    _add_audit(commands)
     repair = commands.add_parser("repair", help="close recordings that a killed process left open")
     repair.add_argument("recordings", type=Path, nargs="+", metavar="FILE")
     repair.add_argument("--ended", action="store_true", help="no program writes them any more")
@@ -338,6 +355,13 @@ def _line_options() -> argparse.ArgumentParser:
 
 def _names(text: str) -> tuple[str, ...]:
     return tuple(each.strip() for each in text.split(",") if each.strip())
+
+
+def _moment(text: str) -> datetime:
+    try:
+        return datetime.fromisoformat(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no time such as 2026-11-23T08:00") from None
 
 
 def _seconds(text: str) -> float:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 
+from cosmic.app.audit import PlatformAudit, audit_file
 from cosmic.app.configuration.gateways import doors
 from cosmic.app.configuration.network import Serving, serving
 from cosmic.app.configuration.platform_file import check_applications, load_platform
@@ -109,7 +110,8 @@ def serve(options: ServeOptions) -> int:
         platform.initialize()
         if platform.failure:
             raise NotConnectedError(platform.failure)
-        host = StationHost(platform, how, opened)
+        audit = at_end.enter_context(PlatformAudit(platform, audit_file()))
+        host = StationHost(platform, how, opened, audit)
         at_end.callback(host.close)  # first of all, so that nobody is answered any more
         sys.stdout.write("\n".join((host.address, *host.gateways, "")))
         sys.stdout.flush()

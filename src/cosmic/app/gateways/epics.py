@@ -237,7 +237,9 @@ class EpicsGateway:
             found = self._sessions.get(who.address)
             if found is None:
                 name = f"EPICS {who.user[:20]} {who.host[:20]} {next(self._numbers)}"
-                found = GatewaySession(self._station, name, self._access, self._approve)
+                found = GatewaySession(
+                    self._station, name, self._access, self._approve, door="epics"
+                )
                 self._sessions[who.address] = found
         return found
 

@@ -175,7 +175,7 @@ class HttpGateway:
 
     def _user(self, settings: HttpClient) -> _User:
         access = Access[settings.access.upper()]
-        session = GatewaySession(self._station, settings.name, access, self._approve)
+        session = GatewaySession(self._station, settings.name, access, self._approve, door="http")
         return _User(settings, session)
 
     def _application(self) -> Starlette:
@@ -575,7 +575,7 @@ class _Server(WorkerThread):
 
 _POLICY: Final = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
-    "img-src blob:; connect-src 'self' ws: wss:; frame-ancestors 'none'"
+    "connect-src 'self' ws: wss:; frame-ancestors 'none'"
 )
 
 

@@ -55,13 +55,21 @@ class GatewaySession:
         What log and windows show.
     approve : callable or None
         Asked before a command that moves is carried out.
+    door : str
+        Which gateway: "http" or "epics".
     """
 
     def __init__(
-        self, station: Station, name: str, access: Access, approve: Approve | None = None
+        self,
+        station: Station,
+        name: str,
+        access: Access,
+        approve: Approve | None = None,
+        *,
+        door: str,
     ) -> None:
         self._station = station
-        self._caller = Caller(name, secrets.token_hex(16), access)
+        self._caller = Caller(name, secrets.token_hex(16), access, door=door)
         self._approve = approve
         self._numbers = count(1)
         self._lock = Lock()

@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from dataclasses import fields
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from cosmic.app.audit import PlatformAudit
 from cosmic.app.configuration.gateways import Doors
 from cosmic.app.configuration.network import Serving
 from cosmic.app.gateways.opened import Gateways
@@ -44,6 +45,8 @@ class StationHost:
     ----------
     doors : Doors
         What is opened for programs that are not CoSMic.
+    audit : PlatformAudit or None
+        Writes what clients command.
 
     Raises
     ------
@@ -55,7 +58,13 @@ class StationHost:
         What a door needs is not installed, or it cannot listen there.
     """
 
-    def __init__(self, platform: Platform, how: Serving, doors: Doors | None = None) -> None:
+    def __init__(
+        self,
+        platform: Platform,
+        how: Serving,
+        doors: Doors | None = None,
+        audit: PlatformAudit | None = None,
+    ) -> None:
         # Imported here: they need the extra `net`.
         from cosmic.frame.network.server_listener import ServerListener
 
@@ -73,6 +82,8 @@ class StationHost:
                 self._station.host(name, side)
             facts = _facts(platform, self._applications)
             self._station.host(ITSELF, StationSide(facts, lease))
+            if audit is not None:
+                undo.callback(audit.join(self._station))
             listener = ServerListener(self._station, _opened(how), how.allowed)
             undo.callback(listener.shut_down)
             listener.start()

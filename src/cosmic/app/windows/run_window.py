@@ -13,6 +13,7 @@ from typing import Final
 from PySide6.QtCore import QCoreApplication, QObject, QSettings, QStandardPaths, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
+from cosmic.app.audit import PlatformAudit, audit_file
 from cosmic.app.configuration.check import key_mistakes
 from cosmic.app.configuration.gateways import doors
 from cosmic.app.configuration.network import serving
@@ -101,7 +102,10 @@ def run_window(options: WindowOptions) -> int:
         at_end.callback(_log_to(ring))
         platform = _build(options)  # before this is the thread of a window, for it may wait
         at_end.callback(platform.shut_down)
-        host = _host(options, platform)
+        audit = None
+        if options.offscreen_s is None:
+            audit = at_end.enter_context(PlatformAudit(platform, audit_file()))
+        host = _host(options, platform, audit)
         if host is not None:
             at_end.callback(host.close)
         at_end.callback(declare_gui_thread())
@@ -173,7 +177,9 @@ def _build(options: WindowOptions) -> Platform:
     return platform
 
 
-def _host(options: WindowOptions, platform: Platform) -> StationHost | None:
+def _host(
+    options: WindowOptions, platform: Platform, audit: PlatformAudit | None
+) -> StationHost | None:
     """Return what serves the platform to others, if it is to be served."""
     network = platform.file.network
     if not (options.serve or network.serve):
@@ -186,7 +192,7 @@ def _host(options: WindowOptions, platform: Platform) -> StationHost | None:
         name=options.name,
         certificates=options.certificates,
     )
-    return StationHost(platform, how, doors(network.http, network.epics))
+    return StationHost(platform, how, doors(network.http, network.epics), audit)
 
 
 @contextmanager

@@ -40,12 +40,15 @@ class Caller:
         What it may do.
     local : bool
         It runs in this process.
+    door : str
+        How it comes: "station", "http", "epics".
     """
 
     name: str
     token: str
     access: Access = Access.MOVE
     local: bool = False
+    door: str = "station"
 
 
 def _never(_at: tuple[str, ...]) -> bool:

@@ -2,10 +2,12 @@
 
 import logging
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from threading import RLock
 from typing import Final
 
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.events import Event
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import Access, Call, Caller, carrying_out
 from cosmic.frame.network.errors import Busy, CallRefused, RemoteDefect
@@ -14,6 +16,16 @@ from cosmic.frame.network.remote import Offered, offered_by
 
 FOR_EVER: Final = -1.0
 logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """A call that was carried out, or refused; what it began may go on."""
+
+    caller: Caller
+    found: Offered
+    arguments: Mapping[str, object]
+    error: CosmicError | None
 
 
 class ApplicationInvoker:
@@ -27,6 +39,11 @@ class ApplicationInvoker:
     application : object
         Its functions marked with `remote` may be called, and nothing else.
 
+    Attributes
+    ----------
+    ended : Event
+        Emitted after each call, in its thread.
+
     Raises
     ------
     TypeError
@@ -36,6 +53,7 @@ class ApplicationInvoker:
     def __init__(
         self, name: str, application: object, lease: StationLease, policy: FailurePolicy
     ) -> None:
+        self.ended: Event[[Ended]] = Event()
         self._name = name
         self._offered = offered_by(application)
         self._lease = lease
@@ -96,6 +114,22 @@ class ApplicationInvoker:
             the program.
         """
         found = self.find(caller, function)
+        try:
+            result = self._invoke(caller, found, arguments, still_wanted, wait_s)
+        except CosmicError as exc:
+            self.ended.emit(Ended(caller, found, arguments, exc))
+            raise
+        self.ended.emit(Ended(caller, found, arguments, None))
+        return result
+
+    def _invoke(
+        self,
+        caller: Caller,
+        found: Offered,
+        arguments: Mapping[str, object],
+        still_wanted: Callable[[], None] | None,
+        wait_s: float,
+    ) -> object:
         checked = found.checked(arguments)
         if found.mark.at_once:
             return self._run(caller, found, checked, still_wanted)

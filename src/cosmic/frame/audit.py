@@ -1,0 +1,135 @@
+"""`AuditTrail`: who commanded what, with which verdict, and when; a line of JSON each."""
+
+import json
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any, Final
+
+from typing_extensions import override
+
+from cosmic.frame.errors import CosmicError, MoveRefused
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.threads import WorkerThread
+
+logger = logging.getLogger(__name__)
+
+DONE: Final = "done"
+REFUSED: Final = "refused"
+FAILED: Final = "failed"
+BEGUN: Final = "begun"
+LONGEST_TEXT: Final = 500
+LARGEST_BYTES: Final = 50_000_000
+"""A file that is larger is kept as ``.1``, and a new one begun."""
+
+
+@dataclass(frozen=True, slots=True)
+class AuditEntry:
+    """One command.
+
+    Attributes
+    ----------
+    when : str
+        UTC, ISO 8601.
+    who : str
+        Name of the client, or what in this program commanded it: "script", "card", "campaign" ...
+    door : str
+        How it came: "local" in this process, or "station", "http", "epics".
+    what : str
+        The command, such as "mico.axes.begin".
+    verdict : str
+        "begun", "done", "refused" or "failed".
+    why : str
+        Reason and text, of what was not done.
+    details : mapping
+        Arguments, as text.
+    """
+
+    who: str
+    door: str
+    what: str
+    verdict: str
+    why: str = ""
+    details: Mapping[str, str] = field(default_factory=dict)
+    when: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="milliseconds"))
+
+
+def verdict_of(error: Exception | None) -> tuple[str, str]:
+    """Return verdict and reason of a command that ended so."""
+    if error is None:
+        return DONE, ""
+    if isinstance(error, MoveRefused):
+        return REFUSED, f"{error.verdict.reason.name}: {error}"[:LONGEST_TEXT]
+    kind = REFUSED if isinstance(error, CosmicError) else FAILED
+    return kind, f"{type(error).__name__}: {error}"[:LONGEST_TEXT]
+
+
+class AuditTrail(WorkerThread):
+    """Writes entries to a file of lines, in a thread of its own; `request_end` and `join` at last.
+
+    A file that cannot be written to is said once in the log, and holds up nothing.
+    """
+
+    def __init__(self, path: Path, policy: FailurePolicy) -> None:
+        super().__init__("audit trail", policy)
+        self._path = path
+        self._waiting: SimpleQueue[AuditEntry | None] = SimpleQueue()
+        self._problem = False
+
+    @property
+    def path(self) -> Path:
+        """Where it is written."""
+        return self._path
+
+    def note(self, entry: AuditEntry) -> None:
+        """Have an entry written; returns at once, any thread."""
+        self._waiting.put(entry)
+
+    @override
+    def run_body(self) -> None:
+        while (entry := self._waiting.get()) is not None:
+            lines = [_line(entry)]
+            while not self._waiting.empty():
+                following = self._waiting.get()
+                if following is None:
+                    self._write(lines)
+                    return
+                lines.append(_line(following))
+            self._write(lines)
+
+    def _write(self, lines: list[str]) -> None:
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            if self._path.exists() and self._path.stat().st_size > LARGEST_BYTES:
+                self._path.replace(self._path.with_name(self._path.name + ".1"))
+            with self._path.open("a", encoding="utf-8") as file:
+                file.writelines(lines)
+        except OSError as exc:
+            if not self._problem:
+                logger.warning("%s: the audit trail cannot be written: %s", self._path, exc)
+            self._problem = True
+
+    @override
+    def request_end(self) -> None:
+        super().request_end()
+        self._waiting.put(None)
+
+
+def _line(entry: AuditEntry) -> str:
+    said = {name: value for name, value in asdict(entry).items() if value}
+    return json.dumps({"when": said.pop("when"), **said}, ensure_ascii=False) + "\n"
+
+
+def read_entries(path: Path) -> Iterator[dict[str, Any]]:
+    """Yield what stands in a trail, oldest first; a line that was cut off is left out."""
+    with path.open(encoding="utf-8") as file:
+        for line in file:
+            try:
+                found = json.loads(line)
+            except ValueError:
+                continue
+            if isinstance(found, dict):
+                yield found
