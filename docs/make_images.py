@@ -97,6 +97,10 @@ class Scene:
     def save(self, name: str) -> None:
         """Save what is seen."""
         self.wait(0.5)
+        book = self.tasks.book
+        for number, each in enumerate(book.alarms):
+            if each.source == "processor":  # of the computer that makes the images
+                book.acknowledge(number)
         self.window.grab().save(str(IMAGES / f"{name}.png"))
 
     def close(self) -> None:

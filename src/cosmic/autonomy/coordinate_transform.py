@@ -10,10 +10,11 @@ from typing_extensions import override
 from cosmic.autonomy.calibrating.registry import CalibrationRegistry
 from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.rotation_procedure import RotationProcedure
+from cosmic.autonomy.stage_check import StageCheck, StageReport
 from cosmic.autonomy.stage_procedure import StageProcedure
 from cosmic.autonomy.tools import axis_targets, expected, tip_um
 from cosmic.frame.errors import ConfigError, NotAvailable
-from cosmic.frame.operation import Task
+from cosmic.frame.operation import Operation, Task
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.mico import mico_of
 from cosmic.mico.api.news import SentMotion
@@ -221,6 +222,21 @@ class PlatformTransform(CoordinateTransform):
         settings = self._tool(tool)
         procedure = StageProcedure(self._vico, self._mico, self.calibrations, settings, camera)
         return self._begin(f"Calibrating {camera} by {settings.shown}", procedure.run)
+
+    def check_stage(self, tool: str, camera: str) -> tuple[Task, Operation[StageReport]]:
+        """Begin to measure how well the two axes of a tool repeat, by the camera.
+
+        Raises
+        ------
+        NotAvailable
+            There is no such tool.
+        """
+        settings = self._tool(tool)
+        procedure = StageProcedure(self._vico, self._mico, self.calibrations, settings, camera)
+        check = StageCheck(procedure, tool, (settings.x_axis, settings.y_axis))
+        title = f"Checking the axes of {settings.shown}"
+        report: Operation[StageReport] = Operation(title)
+        return self._begin(title, lambda task: check.run(task, report)), report
 
     @override
     def find_rotation_centre(self, camera: str) -> Task:

@@ -1,11 +1,11 @@
 """Measuring the map from platform to image: a tool goes to positions, its tip is looked for."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import pairwise
-from typing import Final
+from typing import Final, TypeVar
 
 import cv2
 import numpy as np
@@ -29,6 +29,7 @@ from cosmic.vico.hw.interface import CameraSettings, Pixels
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.uint8]
+T = TypeVar("T")
 
 LEAST_CHANGE: Final = 15.0
 """Grey levels of 255 that count as a change at least."""
@@ -72,7 +73,7 @@ LARGEST_PART: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True)
-class _Guess:
+class TipMap:
     """A first idea of the map: where the tip is seen at a position, and what moves do."""
 
     position_um: Floats
@@ -80,9 +81,11 @@ class _Guess:
     px_um: Floats
 
     def px(self, position_um: Floats) -> Floats:
+        """Return where the tip is seen at a position, shape (2,)."""
         return np.asarray(self.tip_px + self.px_um @ (position_um - self.position_um))
 
     def um(self, point_px: Floats) -> Floats:
+        """Return where the tip is that is seen at a pixel, shape (2,)."""
         return np.asarray(self.position_um + np.linalg.solve(self.px_um, point_px - self.tip_px))
 
 
@@ -108,17 +111,34 @@ class StageProcedure:
     def run(self, task: Task) -> None:
         """Measure, keep, and go back where the tool was."""
         try:
-            begun = self._position()
-            self._mover.remember()
-            try:
-                plane = self._measure(task, begun)
-            finally:
-                self._mover.go_back(task, self._source)
+            plane = self.around(task, self._measure)
             self._calibrations.add_plane(self._camera, self._tool.name, plane)
             task.report(1.0, _said(plane.fit))
             task.finish()
         except CosmicError as exc:
             task.fail(exc)
+
+    def around(self, task: Task, measure: Callable[[Task, Floats], T]) -> T:
+        """Return what `measure` finds from where the tip is now, and go back; raises as it does."""
+        begun = self._position()
+        self._mover.remember()
+        try:
+            return measure(task, begun)
+        finally:
+            self._mover.go_back(task, self._source)
+
+    @property
+    def ahead(self) -> Floats:
+        """Where the tool points, shape (2,), of length 1."""
+        return np.asarray(np.array(self._tool.forward) / math.hypot(*self._tool.forward))
+
+    def first_idea(self, task: Task, begun: Floats) -> TipMap:
+        """Find the tip, and return about where it is seen at a position."""
+        return self._search(task, self._image(self._clock.now_s()), begun[:2])
+
+    def move(self, task: Task, position_um: Floats) -> None:
+        """Move the tip to a position of the platform, shape (2,)."""
+        self._go(task, position_um)
 
     def _measure(self, task: Task, begun: Floats) -> Plane:
         first = self._image(self._clock.now_s())
@@ -127,7 +147,7 @@ class StageProcedure:
         sightings = []
         for number, position in enumerate(positions, start=1):
             task.report(number / (len(positions) + 1), f"position {number} of {len(positions)}")
-            seen = self._sight(task, position, guess)
+            seen = self.sight(task, position, guess)
             if seen is not None:
                 sightings.append(seen)
         zoom = self._zoom(first)
@@ -163,7 +183,7 @@ class StageProcedure:
 
     # The first idea
 
-    def _search(self, task: Task, first: CameraImage, position_um: Floats) -> _Guess:
+    def _search(self, task: Task, first: CameraImage, position_um: Floats) -> TipMap:
         """Find the tip by drawing it back twice, then what a step aside does."""
         self._zoom(first)
         scale = first.circumstances.scale_um_px
@@ -172,8 +192,7 @@ class StageProcedure:
                 f"{self._camera}: the approximate pixel size is unknown; set scale_um_px"
             )
         task.report(0.02, f"looking for {self._tool.shown}")
-        ahead = np.array(self._tool.forward) / math.hypot(*self._tool.forward)
-        step_um = SEARCH_PART * self._tool.width_um * ahead
+        step_um = SEARCH_PART * self._tool.width_um * self.ahead
         images = [first]
         for times in (1, 2):
             since_s = self._go(task, position_um - times * step_um)
@@ -194,30 +213,30 @@ class StageProcedure:
             raise NotAvailable(self._unseen(seen.reason))
         return self._aside(task, guess, seen, step_um)
 
-    def _aside(self, task: Task, guess: _Guess, tip_px: Floats, step_um: Floats) -> _Guess:
+    def _aside(self, task: Task, guess: TipMap, tip_px: Floats, step_um: Floats) -> TipMap:
         """Learn what a step aside does: no idea of the camera's handedness is taken for granted."""
         aside_um = np.array([-step_um[1], step_um[0]])
         position = guess.position_um + aside_um
         image = self._image(self._go(task, position))
         moved_px = float(np.linalg.norm(guess.px_um @ step_um))
-        at = _Guess(position, tip_px, guess.px_um)
+        at = TipMap(position, tip_px, guess.px_um)
         seen = self._look(image, at, position, moved_px + REACH_PX)
         if isinstance(seen, NotSeen):
             raise NotAvailable(self._unseen(seen.reason))
         both_um = np.column_stack([step_um, aside_um])
         both_px = np.column_stack([guess.px_um @ step_um, seen - tip_px])
-        return _Guess(guess.position_um, tip_px, both_px @ np.linalg.inv(both_um))
+        return TipMap(guess.position_um, tip_px, both_px @ np.linalg.inv(both_um))
 
     @staticmethod
-    def _similar(position: Floats, tip_px: Floats, step_um: Floats, back_px: Floats) -> _Guess:
+    def _similar(position: Floats, tip_px: Floats, step_um: Floats, back_px: Floats) -> TipMap:
         """Return a map that turns and stretches, from what a step back did; y is up, rows down."""
         one = complex(*(-back_px)) / complex(step_um[0], -step_um[1])
         turn = np.array([[one.real, -one.imag], [one.imag, one.real]])
-        return _Guess(position, tip_px, turn @ np.array([[1.0, 0.0], [0.0, -1.0]]))
+        return TipMap(position, tip_px, turn @ np.array([[1.0, 0.0], [0.0, -1.0]]))
 
     # Positions
 
-    def _grid(self, guess: _Guess, first: CameraImage) -> Sequence[Floats]:
+    def _grid(self, guess: TipMap, first: CameraImage) -> Sequence[Floats]:
         """Return positions at which the tip and enough of the tool are on the image, to and fro."""
         height, width = first.data.shape[:2]
         scale_px_um = math.sqrt(abs(float(np.linalg.det(guess.px_um))))
@@ -244,7 +263,8 @@ class StageProcedure:
         ]
         return [position for row in rows for position in row]
 
-    def _sight(self, task: Task, position_um: Floats, guess: _Guess) -> Sighting | None:
+    def sight(self, task: Task, position_um: Floats, guess: TipMap) -> Sighting | None:
+        """Move the tip to a position and look for it; None where it was not seen."""
         image = self._image(self._go(task, position_um))
         stood = tip_um(self._tool, image.circumstances.positions) or tuple(self._position())
         seen = self._look(image, guess, np.array(stood[:2]), REACH_PX)
@@ -254,7 +274,7 @@ class StageProcedure:
         return Sighting((stood[0], stood[1]), (float(sensor[0]), float(sensor[1])))
 
     def _look(
-        self, image: CameraImage, guess: _Guess, position_um: Floats, reach_px: float
+        self, image: CameraImage, guess: TipMap, position_um: Floats, reach_px: float
     ) -> Floats | NotSeen:
         """Return where the tip is seen, in the image's pixels."""
         tip = guess.px(position_um)

@@ -196,7 +196,7 @@ class CameraThread(WorkerThread):
                 self._restart(camera, settings, before)
             self._ranges = camera.ranges
             self._shown = None  # it was taken with other settings
-            logger.info("%s: %s", self.name, self._settings)
+            logger.info("%s takes images with %s", self.name, self._settings)
 
         return self._put(f"Settings of {self.camera_name}", command)
 

@@ -212,7 +212,7 @@ class BaseCamera(Camera, ABC):
                     self._put_back(present)
                 raise refusal from exc
             self._read_back()
-            logger.info("%s: %s", self._whom, self._settings)
+            logger.info("%s takes images with %s", self._whom, self._settings)
             return self._settings
 
     @override

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from cosmic.frame.clock import Clock
 from cosmic.frame.plugins import Backend
@@ -159,6 +160,14 @@ class CameraSettings:
     binning: int = 1
     pixel_format: PixelFormat = PixelFormat.MONO8
     trigger: Trigger = Trigger.FREE_RUN
+
+    @override
+    def __str__(self) -> str:
+        return (
+            f"{1000.0 * self.exposure_s:g} ms, {self.gain_db:g} dB, {self.rate_hz:g} Hz, "
+            f"{self.roi.width_px} x {self.roi.height_px} px, binning {self.binning}, "
+            f"{self.pixel_format}, {self.trigger}"
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -104,7 +104,7 @@ class GroupStart:
         if not stamps_s:
             return
         self._skew_ms = 1e3 * (stamps_s[-1] - stamps_s[0])
-        logger.info("%s started within %.2f ms", ", ".join(names), self._skew_ms)
+        logger.info("%s started together, within %.2f ms", ", ".join(names), self._skew_ms)
         self._on_started(GroupStarted(names, self._skew_ms))
 
     def _start_in_turn(self) -> list[float]:

@@ -628,7 +628,7 @@ class DeviceManager(QObject):
     def reset_stop(self) -> None:
         """Allow motion again."""
         self.latch.reset()
-        logger.info("stop reset")
+        logger.info("The stop was reset: movements are allowed again")
 
     def _on_watched_again(self, axes: Set[str], pairs: Set[BodyPair]) -> None:
         """Stop what moves only by leave of an exemption that has ended; any thread.

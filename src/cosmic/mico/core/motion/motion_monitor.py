@@ -21,7 +21,7 @@ from cosmic.mico.core.motion.channel_speed import ChannelSpeed, quietly
 from cosmic.mico.core.motion.jog import JogRun
 from cosmic.mico.core.motion.messages import MovementBegun, Order
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import Jog, Reference, Reservation, Step
+from cosmic.mico.core.motion.orders import Jog, Reference, Reservation, Step, motion_text
 from cosmic.mico.core.motion.positioner import (
     Confidence,
     CountedTravel,
@@ -332,7 +332,7 @@ class MotionMonitor:
                 self._context.reports.failed(self._name, over)
         # What goes on from an order reported already would fill the log.
         level = logging.INFO if order.follows is None else logging.DEBUG
-        logger.log(level, "%s: %s (%s)", self._name, order.motion, order.source)
+        logger.log(level, "%s %s, by %s", self._name, motion_text(order.motion), order.source)
         if self.active is not None:
             self._context.reports.begun(
                 MovementBegun(

@@ -93,6 +93,26 @@ MOTION_WORDS: Final[dict[type, str]] = {
 Motion = MoveTo | MoveBy | Step | Jog | Calibrate | Reference | ToEndStop
 
 
+def motion_text(motion: Motion) -> str:
+    """Return what an axis does, as the log says it: "moves to 120.0 um"."""
+    match motion:
+        case MoveTo():
+            return f"moves to {motion.target:.1f} {motion.unit}"
+        case MoveBy():
+            return f"moves by {motion.distance:+.1f} {motion.unit}"
+        case Step():
+            return f"makes {motion.steps:+d} steps of {motion.amplitude_v:g} V"
+        case Jog():
+            kind = "is steered" if isinstance(motion, Steer) else "jogs"
+            return f"{kind} {'up' if motion.direction > 0 else 'down'} at {motion.speed:g} a second"
+        case Calibrate():
+            return "calibrates its sensor"
+        case Reference():
+            return "looks for its reference"
+        case ToEndStop():
+            return "drives to its end stop"
+
+
 @dataclass(frozen=True, slots=True)
 class Interval:
     """All places of one axis that a movement can take it to, in the axis' unit."""
