@@ -13,6 +13,7 @@ import pytest
 import cosmic
 from cosmic.app.platform import build_platform
 from cosmic.app.stations import hosting
+from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import MoveCancelled
 from cosmic.twin.scene import Scene
@@ -394,3 +395,20 @@ def test_a_gripper_out_of_focus_across_the_image_does_not_end_the_finding_of_fib
         wait_until(lambda: camera.analysis is not None and camera.analysis.fibres)
         (link,) = [each for each in camera.algorithms if each.name == "fibres"]
         assert (link.on, link.failing) == (True, False)
+
+
+@pytest.mark.slow
+def test_the_camera_says_how_well_the_axes_of_a_tool_repeat(lab: Lab) -> None:
+    lower(lab)
+    begun = at_right(lab.rig)
+    transform = lab.rig.vico.application.transform
+    assert isinstance(transform, PlatformTransform)
+    task, found = transform.check_stage("right", lab.rig.vico.cameras[0])
+    task.wait(120.0)
+    report = found.result
+    for each, towards in zip(report.axes, (0.0, 90.0), strict=True):
+        assert abs(each.direction_deg - towards) < 3.0
+        assert each.pixel_um == pytest.approx(2.2, rel=0.02)
+        assert each.repeatability_um < 0.5
+        assert abs(each.backlash_um) < 0.5
+    assert at_right(lab.rig) == pytest.approx(begun, abs=1.0)
