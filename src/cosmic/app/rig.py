@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from cosmic.autonomy.campaign.campaign import Campaign
     from cosmic.autonomy.campaign.recipe import Recipe
     from cosmic.autonomy.handling.context import HandlingContext
+    from cosmic.autonomy.handling.marked import MarkedFibre
     from cosmic.autonomy.handling.settings import HandlingSettings
+    from cosmic.autonomy.recorded.steps import RecordedProcedure
     from cosmic.autonomy.shipped.fibre_handling import FibreHandling
 
 W = TypeVar("W")
@@ -209,6 +211,42 @@ class Rig:
 
             self._handling = FibreHandling(self, self.procedure, self._running)
         return self._handling
+
+    def replay(
+        self,
+        procedure: "RecordedProcedure | str | Path",
+        marked: "MarkedFibre | None" = None,
+        *,
+        folder: str | Path = ".",
+    ) -> "ProcedureRun[HandlingContext]":
+        """Return a run that replays a recorded procedure; begin it by `run_here` or `start`.
+
+        Parameters
+        ----------
+        procedure : RecordedProcedure or path
+            It, or the file it was saved in.
+        marked : MarkedFibre or None
+            The fibre it is replayed on; None: where it needs one, the first that is certain.
+        folder : path
+            Where its recordings go.
+
+        Raises
+        ------
+        ConfigError
+            The file cannot be read, or a step cannot be carried out here.
+        NotAvailable
+            Something else runs, or no fibre is seen.
+        """
+        from cosmic.autonomy.recorded.operations import Surroundings
+        from cosmic.autonomy.recorded.replay import mark_one, replay_on
+        from cosmic.autonomy.recorded.steps import RecordedProcedure, load_recorded
+
+        if not isinstance(procedure, RecordedProcedure):
+            procedure = load_recorded(Path(procedure))
+        if marked is None and procedure.needs_fibre:
+            marked = mark_one(self)
+        around = Surroundings(marked, folder=lambda: Path(folder))
+        return replay_on(self.handling, procedure, around)
 
     def _running(self) -> str:
         """Return which campaign or procedure runs, in words; empty for none."""

@@ -1,6 +1,7 @@
 """Operations on a fibre from the picture: right-click it, see what would happen, choose."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -19,10 +20,19 @@ from cosmic.vico.gui.camera_view import CameraView
 from cosmic.vico.gui.mark_layer import NEAR_PX, fibre_at
 
 if TYPE_CHECKING:
+    from cosmic.autonomy.handling.context import HandlingContext
+    from cosmic.autonomy.handling.marked import MarkedFibre
+    from cosmic.autonomy.procedures.run import ProcedureRun
+    from cosmic.autonomy.recorded.operations import OperatorSignal
+    from cosmic.autonomy.recorded.steps import RecordedProcedure
     from cosmic.autonomy.shipped.fibre_handling import FibreHandling, OperationRequest
 
 USUAL_FORCE_UN: Final = 50.0
 _FIBRES: Final = "fibres"
+
+
+def _nothing() -> None:
+    return None
 
 
 class FibreOperations(QObject):
@@ -43,10 +53,16 @@ class FibreOperations(QObject):
         An operation has begun, by its title.
     ended()
         One has ended, or was refused.
+    replay_wanted()
+        What is offered is to be replayed on the fibre that is marked.
+    waiting(str)
+        A replay waits for the operator, in words; empty: it goes on.
     """
 
     began = Signal(str)
     ended = Signal()
+    waiting = Signal(str)
+    replay_wanted = Signal()
 
     def __init__(
         self, rig: Rig, stage: Stage, scene: ScenePanel, cameras: list[CameraView], parent: QObject
@@ -58,6 +74,11 @@ class FibreOperations(QObject):
         self._relay: Relay[()] | None = None
         self._shown: object = None
         self._cameras, self._found_on = list(cameras), list[CameraView]()
+        self.marked: MarkedFibre | None = None
+        self.offered: Callable[[], RecordedProcedure | None] = _nothing
+        """What the menu offers to replay on a fibre."""
+        self._going_on: OperatorSignal | None = None
+        self._asks: Relay[str] = Relay(self._on_asked)
         self.card.resized.connect(stage.lay_card)
         self.card.next_requested.connect(self._on_next)
         self.card.undo_requested.connect(self.undo)
@@ -120,6 +141,12 @@ class FibreOperations(QObject):
         ]
         for request in requests:
             self._offer_one(view, menu, request, fibre)
+        self.marked = marked or self.marked
+        procedure = self.offered()
+        if procedure is not None and marked is not None:
+            action = menu.addAction(f"Replay {procedure.name}")
+            action.hovered.connect(lambda: view.mark.show(marked.line_px))
+            action.triggered.connect(lambda: self.replay_wanted.emit())
         menu.aboutToHide.connect(lambda: self._show_preview(view, None))
         menu.setToolTipsVisible(True)
 
@@ -178,18 +205,45 @@ class FibreOperations(QObject):
             self._offer_next()
             self.ended.emit()
             return
+        self._start(request.title, run)
+
+    def _start(self, title: str, run: "ProcedureRun[HandlingContext]") -> None:
         self._found_on = [view for view in self._cameras if self.finding(view)]
         for view in self._found_on:  # what an operation looks for, it finds by itself
             self.find(view, on=False)
-        self.card.follow(request.title, run)
+        self.card.follow(title, run)
         run.start()
-        self.began.emit(request.title)
+        self.began.emit(title)
 
     def push(self, force_un: float) -> None:
         """Push the held fibre to a force."""
         from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
 
         self.begin(OperationRequest(SingleOperation.PUSH, force_un=force_un))
+
+    def replay(self, procedure: "RecordedProcedure", folder: Callable[[], Path]) -> None:
+        """Replay a recorded procedure, on the marked fibre where it needs one."""
+        from cosmic.autonomy.recorded.operations import Surroundings
+        from cosmic.autonomy.recorded.replay import replay_on
+
+        title = f"Replay {procedure.name}"
+        around = Surroundings(self.marked, folder, asks=self._asks)
+        try:
+            run = replay_on(self.handling, procedure, around)
+        except CosmicError as exc:
+            self.card.show_refused(title, str(exc))
+            self.ended.emit()
+            return
+        self._going_on = around.going_on
+        self._start(title, run)
+
+    def _on_asked(self, words: str) -> None:
+        self.waiting.emit(words)
+
+    def go_on(self) -> None:
+        """Have a replay that waits for the operator go on."""
+        if self._going_on is not None:
+            self._going_on.give()
 
     def close_gently(self, gripper: str) -> None:
         """Close the jaws of a gripper slowly, until they hold."""

@@ -2,7 +2,7 @@
 
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from PySide6.QtCore import QObject, QSettings, QTimer
 from PySide6.QtWidgets import QStackedWidget, QWidget
@@ -16,6 +16,7 @@ from cosmic.app.panels.history import HistoryPanel
 from cosmic.app.panels.image_bar import ImageBar
 from cosmic.app.panels.instruments import DAQCO, LENS, Instruments
 from cosmic.app.panels.procedures import CONTROL, TELEOPERATION, TRAJECTORIES
+from cosmic.app.panels.recorded import RECORDER, RecorderPanel
 from cosmic.app.panels.results.panel import ResultsPanel
 from cosmic.app.panels.scene import ScenePanel
 from cosmic.app.panels.tool import ToolPanel
@@ -29,6 +30,7 @@ from cosmic.app.windows.picture_move import PictureMove
 from cosmic.app.windows.stage import SCENE_TITLE, Stage, column_of
 from cosmic.frame.failure import Failure
 from cosmic.frame.gui.clearance_meter import closeness
+from cosmic.frame.gui.late_panel import LatePanel
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.gui.workspaces import Area, Place, Workspace
@@ -36,6 +38,9 @@ from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.vico.gui.camera_view import CameraParts
+
+if TYPE_CHECKING:
+    from cosmic.autonomy.recorded.recorder import ProcedureRecorder
 
 MICO: Final = "Axes"
 TOOL: Final = "Tool"
@@ -97,6 +102,7 @@ def workspaces(others: tuple[str, ...] = ()) -> tuple[Workspace, ...]:
             (
                 _left(TOOL),
                 Place(TRAJECTORIES, _LEFT, tabbed=TOOL, shown=False),
+                Place(RECORDER, _LEFT, tabbed=TOOL, shown=False),
                 Place(TELEOPERATION, _LEFT, tabbed=TOOL, shown=False),
                 _right(FORCE),
                 _coach(FORCE),
@@ -160,8 +166,10 @@ class TaskLayout(QObject):
         views = list(cameras.values())
         self._picture_move = PictureMove(rig, gui, self.tool, scene, views, self)
         self.operations: FibreOperations | None = None
+        self.recorder: LatePanel[RecorderPanel] | None = None
         if can_run(platform):
             self.operations = FibreOperations(rig, self.stage, scene, views, self)
+            self.recorder = LatePanel(self._make_recorder)
             self.tool.offer_gently()
             self.tool.close_gently_requested.connect(self.operations.close_gently)
         self.force = ForcePanel(rig.daqco, gui, self.folder) if instruments.force else None
@@ -180,6 +188,8 @@ class TaskLayout(QObject):
     def _add_panels(self) -> None:
         add = self._window.add_panel
         add(TOOL, self.tool, _LEFT, scroll=False)
+        if self.recorder is not None:
+            add(RECORDER, self.recorder, _LEFT, scroll=False)
         if self.force is not None:
             add(FORCE, self.force, _RIGHT, scroll=False)
         add(LENS, self._images.lens, _RIGHT, scroll=False)
@@ -191,6 +201,27 @@ class TaskLayout(QObject):
         add(IMAGE, self._image, _LEFT, scroll=False)
         add(CAMERA, self._camera, _RIGHT)
         add(RESULTS, self.results, _LEFT, scroll=False)
+
+    def _make_recorder(self) -> RecorderPanel:
+        """Make the panel of recorded procedures, and join it to what carries them out."""
+        operations = self.operations
+        assert operations is not None
+
+        def watch() -> "ProcedureRecorder":
+            from cosmic.autonomy.recorded.recorder import ProcedureRecorder
+
+            return ProcedureRecorder(self._rig, operations.handling, lambda: operations.marked)
+
+        tools = tuple(self.stage.camera.camera.targets)
+        panel = RecorderPanel(watch, lambda: ("platform", "fibre", "plate", *tools), self.folder)
+        panel.replay_requested.connect(lambda found: operations.replay(found, self.folder))
+        panel.continued.connect(operations.go_on)
+        operations.waiting.connect(panel.show_waiting)
+        operations.replay_wanted.connect(panel.request_replay)
+        operations.offered = lambda: panel.procedure if panel.list.count() else None
+        if self.force is not None:
+            self.force.mark.clicked.connect(operations.go_on)
+        return panel
 
     @staticmethod
     def _image_column(parts: CameraParts) -> QWidget:

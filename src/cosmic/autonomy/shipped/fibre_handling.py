@@ -171,6 +171,7 @@ class FibreHandling:
         self._done: list[SingleOperation] = []
         self._run: ProcedureRun[HandlingContext] | None = None
         self._result: OperationResult | None = None
+        self._request: OperationRequest | None = None
         self._changed: Event[[]] = Event()
 
     @override
@@ -188,6 +189,11 @@ class FibreHandling:
     def run(self) -> ProcedureRun[HandlingContext] | None:
         """The operation begun last; None before the first."""
         return self._run
+
+    @property
+    def request(self) -> OperationRequest | None:
+        """What was asked for last; None before the first, and after a recorded procedure."""
+        return self._request
 
     @property
     def running(self) -> bool:
@@ -305,7 +311,7 @@ class FibreHandling:
 
     def _preview_take(self, gripper: str, marked: MarkedFibre) -> OperationPreview:
         try:
-            work = self._context(gripper)
+            work = self.context(gripper)
             approach = approach_to(work, marked)
         except CosmicError as exc:
             return OperationPreview(f"{gripper} is calibrated first: {exc}")
@@ -336,14 +342,56 @@ class FibreHandling:
                 raise NotAvailable(f"{request.title}: {why}")
             taking = request.operation is SingleOperation.TAKE
             own = taking or request.operation is SingleOperation.CLOSE
-            work = self._context(request.gripper if own else self._gripper)
+            work = self.context(request.gripper if own else self._gripper)
             push, closing = PushToForce(request.force_un), CloseGently()
             procedure = self._procedure(request, work, push, closing)
             if taking:
                 self._gripper, self._done = request.gripper, []
                 work.shared.surveyed = False
-            run = self._make_run(procedure, work)
-            self._run = run
+            self._request = request
+            return self._made(
+                procedure, work, lambda run: self._on_end(request, run, push, closing)
+            )
+
+    def prepare_recorded(
+        self,
+        procedure: Procedure[HandlingContext],
+        gripper: str,
+        operations: tuple[SingleOperation, ...] = (),
+    ) -> ProcedureRun[HandlingContext]:
+        """Return the run of a procedure of many steps on the context of a gripper.
+
+        Parameters
+        ----------
+        operations : tuple of SingleOperation
+            Those among its steps, for `UNDO` to know what was done.
+
+        Raises
+        ------
+        NotAvailable
+            Something else runs.
+        ConfigError
+            There is no such gripper.
+        """
+        with self._lock:
+            if self.running or self._busy():
+                what = self._busy() or "an operation"
+                raise NotAvailable(f"{procedure.name}: {what} is running; end it first")
+            if self.fibre is not None and gripper != self._gripper:
+                raise NotAvailable(f"{self._gripper} holds a fibre; put it away first")
+            work = self.context(gripper)
+            work.shared.surveyed = False
+            self._gripper, self._request = gripper, None
+            return self._made(procedure, work, lambda run: self._on_replayed(run, operations))
+
+    def _made(
+        self,
+        procedure: Procedure[HandlingContext],
+        work: HandlingContext,
+        on_end: Callable[[ProcedureRun[HandlingContext]], None],
+    ) -> ProcedureRun[HandlingContext]:
+        """Return a run that is followed to its end."""
+        run = self._run = self._make_run(procedure, work)
         done = False
 
         def look() -> None:
@@ -352,12 +400,19 @@ class FibreHandling:
                 self._changed.emit()
             elif not done:
                 done = True
-                self._on_end(request, run, push, closing)
+                on_end(run)
 
         run.on_change(look)
         return run
 
-    def _context(self, gripper: str) -> HandlingContext:
+    def context(self, gripper: str) -> HandlingContext:
+        """Return what the operations of a gripper share; made when it is first asked for.
+
+        Raises
+        ------
+        ConfigError
+            There is no such gripper, or the platform has not what the settings name.
+        """
         if gripper not in self.grippers:
             raise ConfigError(f"there is no gripper {gripper!r}")
         with self._lock:
@@ -408,6 +463,22 @@ class FibreHandling:
             result = OperationResult(
                 request.title, good=False, text=_failed(run), values=_doubtful(work)
             )
+        self._end(result)
+
+    def _on_replayed(
+        self, run: ProcedureRun[HandlingContext], operations: tuple[SingleOperation, ...]
+    ) -> None:
+        if run.failure is None:
+            self._done = []
+            for each in operations:
+                self._note_done(each)
+            text = "Every step was carried out."
+            result = OperationResult(f"Replay {run.name}", good=True, text=text)
+        else:
+            result = OperationResult(f"Replay {run.name}", good=False, text=_failed(run))
+        self._end(result)
+
+    def _end(self, result: OperationResult) -> None:
         if self.fibre is None:
             self._done = []
         self._result = result

@@ -1,0 +1,1 @@
+"""Procedures that were recorded by hand, and are edited, kept and replayed."""

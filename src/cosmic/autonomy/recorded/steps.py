@@ -1,0 +1,324 @@
+"""What a recorded procedure consists of: steps as data, as a readable file, and as Python."""
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+import tomlkit
+from pydantic import Field, ValidationError
+from typing_extensions import override
+
+from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+from cosmic.frame.config import StrictModel
+from cosmic.frame.errors import ConfigError
+from cosmic.frame.kept_file import write_whole
+
+PLATFORM: Final = "platform"
+FIBRE: Final = "fibre"
+PLATE: Final = "plate"
+FRAMES: Final = (PLATFORM, FIBRE, PLATE)
+"""What a point may be relative to, beside the tip of a tool, which is given by its name."""
+
+
+class RecordedStep(StrictModel):
+    """One step.
+
+    Attributes
+    ----------
+    ask : dict of str to str
+        Keys of this step that are asked for at each replay, with the words that ask.
+    """
+
+    ask: dict[str, str] = Field(default_factory=dict)
+
+    @property
+    def words(self) -> str:
+        """The step in one line."""
+        raise NotImplementedError
+
+
+class MoveStep(RecordedStep):
+    """A movement of a tool, or of single axes, all together.
+
+    Attributes
+    ----------
+    tool : str
+        Whose tip goes to `point_um`; empty where only `axes` move.
+    point_um : (float, float, float)
+        Of the tip, x, y and z; x and y from the middle of the fibre, from the rotation centre of
+        the plate and turning with it, or from the tip of another tool.
+    relative_to : str
+        "platform", "fibre", "plate", or the name of a tool.
+    axes : dict of str to float
+        Further axes, absolute; um or degrees.
+    """
+
+    kind: Literal["move"] = "move"
+    tool: str = ""
+    point_um: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    relative_to: str = PLATFORM
+    axes: dict[str, float] = Field(default_factory=dict)
+
+    @property
+    @override
+    def words(self) -> str:
+        """The step in one line."""
+        parts = []
+        if self.tool:
+            x, y, z = self.point_um
+            beside = "" if self.relative_to == PLATFORM else f" from the {self.relative_to}"
+            parts.append(f"{self.tool} to {x:.0f}, {y:.0f}, {z:.0f} µm{beside}")
+        parts += [f"{name} to {value:.1f}" for name, value in self.axes.items()]
+        return f"Move {', '.join(parts)}"
+
+
+class GripperStep(RecordedStep):
+    """A gripper opens or closes to a width, as its steps are counted."""
+
+    kind: Literal["gripper"] = "gripper"
+    tool: str
+    opening_um: float = Field(ge=0.0)
+
+    @property
+    @override
+    def words(self) -> str:
+        """The step in one line."""
+        return f"Open {self.tool} to {self.opening_um:.0f} µm"
+
+
+class LensStep(RecordedStep):
+    """The lens zooms, focuses, or both."""
+
+    kind: Literal["lens"] = "lens"
+    zoom: float | None = Field(None, gt=0.0)
+    focus_counts: int | None = Field(None, ge=0)
+
+    @property
+    @override
+    def words(self) -> str:
+        """The step in one line."""
+        zoom = f"zoom {self.zoom:.3g}x" if self.zoom is not None else ""
+        focus = f"focus {self.focus_counts} counts" if self.focus_counts is not None else ""
+        return f"Lens: {', '.join(filter(None, [zoom, focus]))}"
+
+
+class LightStep(RecordedStep):
+    """The light is set."""
+
+    kind: Literal["light"] = "light"
+    percent: float = Field(ge=0.0, le=100.0)
+
+    @property
+    @override
+    def words(self) -> str:
+        """The step in one line."""
+        return f"Light {self.percent:.0f} %"
+
+
+class RecordStep(RecordedStep):
+    """A recording begins, or ends where `name` is empty."""
+
+    kind: Literal["record"] = "record"
+    name: str = ""
+
+    @property
+    @override
+    def words(self) -> str:
+        """The step in one line."""
+        return f"Record {self.name}" if self.name else "End the recording"
+
+
+class WaitForForceStep(RecordedStep):
+    """It goes on once a force is reached, either sign."""
+
+    kind: Literal["wait for force"] = "wait for force"
+    channel: str = "force"
+    force_un: float = Field(gt=0.0)
+    timeout_s: float = Field(60.0, gt=0.0)
+
+    @property
+    @override
+    def words(self) -> str:
+        """The step in one line."""
+        return f"Wait until {self.channel} reaches {self.force_un:g} µN"
+
+
+class WaitForOperatorStep(RecordedStep):
+    """It goes on once the operator says so: by a key, or by a mark in the recording."""
+
+    kind: Literal["wait for key", "wait for mark"] = "wait for key"
+    text: str = ""
+
+    @property
+    @override
+    def words(self) -> str:
+        """The step in one line."""
+        return f"{self.kind.capitalize()}{f': {self.text}' if self.text else ''}"
+
+
+class PauseStep(RecordedStep):
+    """Nothing happens for a while."""
+
+    kind: Literal["pause"] = "pause"
+    seconds: float = Field(gt=0.0)
+
+    @property
+    @override
+    def words(self) -> str:
+        """The step in one line."""
+        return f"Pause {self.seconds:g} s"
+
+
+class OperationStep(RecordedStep):
+    """An operation on the fibre, such as a campaign makes."""
+
+    kind: Literal["operation"] = "operation"
+    operation: SingleOperation
+    gripper: str = ""
+    force_un: float = Field(50.0, gt=0.0)
+
+    @property
+    @override
+    def words(self) -> str:
+        """The step in one line."""
+        return OperationRequest(self.operation, self.gripper, self.force_un).title
+
+
+Step = Annotated[
+    MoveStep
+    | GripperStep
+    | LensStep
+    | LightStep
+    | RecordStep
+    | WaitForForceStep
+    | WaitForOperatorStep
+    | PauseStep
+    | OperationStep,
+    Field(discriminator="kind"),
+]
+
+
+class RecordedProcedure(StrictModel):
+    """A name, and steps in order."""
+
+    name: str
+    step: list[Step] = Field(default_factory=list)
+
+    @property
+    def asked(self) -> dict[tuple[int, str], tuple[str, float]]:
+        """What a replay asks for: by step and key, the words, and the value recorded."""
+        return {
+            (number, key): (words, float(getattr(step, key)))
+            for number, step in enumerate(self.step)
+            for key, words in step.ask.items()
+        }
+
+    def with_values(self, values: dict[tuple[int, str], float]) -> "RecordedProcedure":
+        """Return it with other values for what is asked; raises `ConfigError`."""
+        steps = [each.model_dump(mode="json") for each in self.step]
+        for (number, key), value in values.items():
+            steps[number][key] = value
+        return _checked({"name": self.name, "step": steps}, self.name)
+
+    @property
+    def needs_fibre(self) -> bool:
+        """True where a fibre must be marked before it is replayed."""
+        return any(
+            (isinstance(each, MoveStep) and each.relative_to == FIBRE)
+            or (isinstance(each, OperationStep) and each.operation is SingleOperation.TAKE)
+            for each in self.step
+        )
+
+    def save(self, path: Path) -> None:
+        """Write it as a readable file; raises `OSError`."""
+        write_whole(path, tomlkit.dumps(self.model_dump(mode="json", exclude_none=True)))
+
+    def save_python(self, path: Path) -> None:
+        """Write it as a script that replays it; raises `OSError`."""
+        write_whole(path, python_of(self))
+
+
+def load_recorded(path: Path) -> RecordedProcedure:
+    """Read a file written by `RecordedProcedure.save`.
+
+    Raises
+    ------
+    ConfigError
+        It cannot be read, or is no recorded procedure; the text names the key.
+    """
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as exc:
+        raise ConfigError(f"{path}: {exc}") from exc
+    return _checked(data, str(path))
+
+
+def _checked(data: dict[str, object], where: str) -> RecordedProcedure:
+    try:
+        return RecordedProcedure.model_validate_json(json.dumps(data))  # tables know no tuples
+    except ValidationError as exc:
+        lines = [
+            f"{where}: {'.'.join(str(part) for part in each['loc'])}: {each['msg']}"
+            for each in exc.errors()
+        ]
+        raise ConfigError("\n".join(lines)) from exc
+
+
+_SCRIPT: Final = '''"""{name}: recorded with CoSMic.
+
+python THIS_FILE replays it on the platform. A procedure that begins with a fibre takes the first
+that is certain.
+"""
+
+import cosmic
+from cosmic.autonomy.recorded.steps import (
+    RecordedProcedure,
+{imports}
+)
+{further}
+PROCEDURE = RecordedProcedure(
+    name={name!r},
+    step=[
+{steps}
+    ],
+)
+
+
+def main() -> None:
+    """Replay it."""
+    with cosmic.connect() as rig:
+        rig.replay(PROCEDURE).run_here()
+
+
+if __name__ == "__main__":
+    main()
+'''
+
+
+def python_of(procedure: RecordedProcedure) -> str:
+    """Return a script that replays a procedure."""
+    kinds = sorted({type(each).__name__ for each in procedure.step})
+    lines = []
+    for each in procedure.step:
+        given = {
+            key: value
+            for key, value in each.model_dump(mode="python", exclude_defaults=True).items()
+            if key != "kind" or isinstance(each, WaitForOperatorStep)
+        }
+        fields = ", ".join(f"{key}={_source(value)}" for key, value in given.items())
+        lines.append(f"        {type(each).__name__}({fields}),  # {each.words}")
+    uses = any(isinstance(each, OperationStep) for each in procedure.step)
+    more = "from cosmic.autonomy.shipped.fibre_handling import SingleOperation\n" if uses else ""
+    return _SCRIPT.format(
+        name=procedure.name,
+        imports="\n".join(f"    {kind}," for kind in kinds),
+        further=more,
+        steps="\n".join(lines),
+    )
+
+
+def _source(value: object) -> str:
+    if isinstance(value, SingleOperation):
+        return f"SingleOperation.{value.name}"
+    return repr(value)

@@ -1,0 +1,106 @@
+"""The recorder's panel: steps appear as they are done, are edited, saved, opened and replayed."""
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QDialogButtonBox
+from pytestqt.qtbot import QtBot
+
+from cosmic.app.panels.recorded import RecorderPanel, ValuesDialog
+from cosmic.autonomy.recorded.steps import (
+    LightStep,
+    MoveStep,
+    OperationStep,
+    RecordedProcedure,
+    RecordedStep,
+)
+from cosmic.autonomy.shipped.fibre_handling import SingleOperation
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+class FakeRecorder:
+    """Notes what a test has it see."""
+
+    def __init__(self) -> None:
+        self.steps: list[RecordedStep] = []
+        self.relative_to = ""
+        self.seen: list[RecordedStep] = []
+
+    def look(self) -> bool:
+        found, self.seen = self.seen, []
+        self.steps += found
+        return bool(found)
+
+    def begin(self) -> None: ...
+
+
+@pytest.fixture
+def recorder() -> FakeRecorder:
+    return FakeRecorder()
+
+
+@pytest.fixture
+def panel(qtbot: QtBot, recorder: FakeRecorder, tmp_path: Path) -> RecorderPanel:
+    made = RecorderPanel(lambda: recorder, lambda: ("platform", "fibre"), lambda: tmp_path)
+    qtbot.addWidget(made)
+    made.show()
+    return made
+
+
+def texts(panel: RecorderPanel) -> list[str]:
+    return [panel.list.item(row).text() for row in range(panel.list.count())]
+
+
+def test_steps_appear_while_they_are_recorded_and_are_put_in_order(
+    panel: RecorderPanel, recorder: FakeRecorder, qtbot: QtBot
+) -> None:
+    assert not panel.replay.isEnabled()
+    panel.frame.setCurrentText("fibre")
+    qtbot.mouseClick(panel.record, LEFT)
+    assert recorder.relative_to == "fibre"
+    recorder.seen = [LightStep(percent=40.0), MoveStep(axes={"left.x": 5.0})]
+    qtbot.waitUntil(lambda: panel.list.count() == 2)
+    assert not panel.replay.isEnabled(), "not while it records"
+    qtbot.mouseClick(panel.record, LEFT)
+    qtbot.mouseClick(panel.up, LEFT)
+    assert texts(panel) == ["1  Move left.x to 5.0", "2  Light 40 %"]
+    panel.add_wait("Wait for key")
+    assert texts(panel)[1] == "2  Wait for key"
+    qtbot.mouseClick(panel.delete, LEFT)
+    assert len(texts(panel)) == 2
+
+
+def test_a_replay_asks_for_its_values_and_hands_them_on(panel: RecorderPanel, qtbot: QtBot) -> None:
+    push = OperationStep(operation=SingleOperation.PUSH, force_un=50.0)
+    panel.show_steps([push])
+    qtbot.mouseClick(panel.ask, LEFT)
+    assert "(asks)" in texts(panel)[0]
+    wanted: list[RecordedProcedure] = []
+    panel.replay_requested.connect(wanted.append)
+    qtbot.mouseClick(panel.replay, LEFT)
+    dialog = panel.findChild(ValuesDialog)
+    assert dialog is not None
+    dialog.fields[0].setText("30")
+    qtbot.mouseClick(dialog.buttons.button(QDialogButtonBox.StandardButton.Ok), LEFT)
+    assert wanted[0].step[0].words == "Push to 30 µN"
+    assert panel.procedure.step[0].words == "Push to 50 µN", "the list keeps what was recorded"
+
+
+def test_a_procedure_is_saved_as_a_file_and_as_python_and_opened_again(
+    panel: RecorderPanel, tmp_path: Path
+) -> None:
+    panel.show_steps([LightStep(percent=40.0)])
+    panel.name.setText("bright")
+    panel.save_as(tmp_path / "bright.toml")
+    assert "LightStep(percent=40.0)" in (tmp_path / "bright.py").read_text("utf-8")
+    panel.show_steps([])
+    panel.open_file(tmp_path / "bright.toml")
+    assert texts(panel) == ["1  Light 40 %"]
+    panel.open_file(tmp_path / "none.toml")
+    assert "none.toml" in panel.line.toolTip()
+    panel.show_waiting("Wait for key")
+    assert panel.go_on.isVisible()
+    panel.show_waiting("")
+    assert not panel.go_on.isVisible()

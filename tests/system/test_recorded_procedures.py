@@ -1,0 +1,109 @@
+"""A procedure recorded by hand on the twin, and replayed on another fibre with another force."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cosmic
+from cosmic.autonomy.handling.marked import MarkedFibre
+from cosmic.autonomy.recorded.operations import Surroundings
+from cosmic.autonomy.recorded.recorder import ProcedureRecorder
+from cosmic.autonomy.recorded.replay import replay_on
+from cosmic.autonomy.recorded.steps import (
+    MoveStep,
+    RecordedProcedure,
+    WaitForOperatorStep,
+    load_recorded,
+)
+from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+from cosmic.twin.truth import read_truth
+from cosmic.vico.core.vision.finding import find_fibres
+
+
+@pytest.mark.slow
+def test_movements_by_hand_become_steps_and_are_replayed(tmp_path: Path) -> None:
+    with cosmic.connect(rate=20.0) as rig:
+        recorder = ProcedureRecorder(rig, rig.handling, lambda: None)
+        assert not recorder.look(), "nothing was done yet"
+        rig.mico.move({"left.x": -300.0, "left.y": 200.0})
+        assert recorder.look()
+        rig.mico["left.gripper"].steps(50)
+        recorder.look()
+        rig.mico["table.rotation"].move_to(5.0)
+        recorder.look()
+        with rig.daqco.record(tmp_path / "one.h5"):
+            recorder.look()
+        recorder.look()
+        kinds = [each.words.split(" ")[0] for each in recorder.steps]
+        assert kinds == ["Move", "Open", "Move", "Record", "End"]
+        there = {name: each.position for name, each in rig.mico.states().items()}
+        rig.mico.move({"left.x": 0.0, "left.y": 0.0, "table.rotation": 0.0})
+        rig.mico["left.gripper"].steps(-30)
+        again = RecordedProcedure(name="again", step=recorder.steps)
+        replay_on(rig.handling, again, Surroundings(folder=lambda: tmp_path)).run_here()
+        assert rig.handling.result is not None
+        assert rig.handling.result.good
+        for name, state in rig.mico.states().items():
+            assert state.position == pytest.approx(there[name], abs=2.0), name
+        assert (tmp_path / "one_1.h5").exists()
+
+
+@pytest.mark.slow
+def test_a_replay_waits_for_the_operator_and_can_be_ended() -> None:
+    with cosmic.connect(rate=20.0) as rig:
+        asked: list[str] = []
+        around = Surroundings(asks=asked.append)
+        waiting = RecordedProcedure(
+            name="wait", step=[WaitForOperatorStep(text="look"), MoveStep(axes={"left.x": -50.0})]
+        )
+        run = replay_on(rig.handling, waiting, around)
+        run.start()
+        around.going_on.give()
+        while not run.over:
+            around.going_on.give()
+        assert run.failure is None
+        assert asked == ["Wait for key: look", ""]
+        assert rig.mico["left.x"].position_um == pytest.approx(-50.0, abs=1.0)
+        again = replay_on(rig.handling, waiting, Surroundings())
+        again.start()
+        again.abort("enough")
+        again.join()
+        assert rig.mico["left.x"].position_um == pytest.approx(-50.0, abs=1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_what_was_done_with_one_fibre_is_done_with_another_at_another_force(
+    tmp_path: Path,
+) -> None:
+    truth = tmp_path / "truth.jsonl"
+    with cosmic.connect(sample="three-dry", rate=8.0, seed=0, truth=truth) as rig:
+        assert rig.vico.lens is not None
+        rig.vico.lens.home().wait(60.0)
+        rig.vico.lens.zoom_to(0.58).wait(60.0)
+        image = rig.vico.camera().next_image(20.0)
+        fibres = [each for each in find_fibres(np.asarray(image.data)) if each.certain]
+        first, second = (MarkedFibre(image, fibres[each].centre_line_px) for each in (0, 2))
+        handling = rig.handling
+        recorder = ProcedureRecorder(rig, handling, lambda: first)
+        for request in (
+            OperationRequest(SingleOperation.TAKE, "left", marked=first),
+            OperationRequest(SingleOperation.BRING),
+            OperationRequest(SingleOperation.PUSH, force_un=40.0),
+            OperationRequest(SingleOperation.PUT_AWAY),
+        ):
+            handling.prepare(request).run_here()
+            assert recorder.look()
+        file = tmp_path / "bend.toml"
+        RecordedProcedure(name="bend", step=recorder.steps).save(file)
+        read = load_recorded(file)
+        assert [each.words for each in read.step][2] == "Push to 40 µN"
+        (asked,) = read.asked
+        changed = read.with_values({asked: 25.0})
+        rig.replay(changed, second).run_here()
+        assert handling.result is not None
+        assert handling.result.good
+        assert rig.mico.allowed_contacts == ()
+    record = read_truth(truth)
+    assert len({each.facts["fibre"] for each in record.of("grasped")}) == 2

@@ -1,0 +1,84 @@
+"""Recorded procedures as files: what is written is read again, and runs as Python."""
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+from cosmic.autonomy.recorded.steps import (
+    GripperStep,
+    LensStep,
+    LightStep,
+    MoveStep,
+    OperationStep,
+    PauseStep,
+    RecordedProcedure,
+    RecordStep,
+    WaitForForceStep,
+    WaitForOperatorStep,
+    load_recorded,
+)
+from cosmic.autonomy.shipped.fibre_handling import SingleOperation
+from cosmic.frame.errors import ConfigError
+
+EVERYTHING = RecordedProcedure(
+    name="pick and bend",
+    step=[
+        OperationStep(operation=SingleOperation.TAKE, gripper="left"),
+        MoveStep(tool="left", point_um=(10.0, -20.0, 400.0), relative_to="fibre"),
+        MoveStep(axes={"table.rotation": 30.0}),
+        GripperStep(tool="left", opening_um=120.0),
+        LensStep(zoom=0.58),
+        LightStep(percent=40.0),
+        RecordStep(name="bend"),
+        OperationStep(operation=SingleOperation.PUSH, force_un=50.0, ask={"force_un": "Force, µN"}),
+        WaitForForceStep(force_un=20.0),
+        WaitForOperatorStep(kind="wait for mark", text="mark the end"),
+        PauseStep(seconds=0.5),
+        RecordStep(),
+    ],
+)
+
+
+def test_what_is_saved_is_read_again_and_can_be_read_by_a_person(tmp_path: Path) -> None:
+    file = tmp_path / "pick.toml"
+    EVERYTHING.save(file)
+    assert load_recorded(file) == EVERYTHING
+    text = file.read_text("utf-8")
+    assert 'operation = "take"' in text
+    assert 'relative_to = "fibre"' in text
+
+
+def test_the_script_holds_the_same_procedure_and_begins_nothing_when_imported(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "pick.py"
+    EVERYTHING.save_python(file)
+    names = runpy.run_path(str(file))
+    assert names["PROCEDURE"] == EVERYTHING
+    assert "# Push to 50 µN" in file.read_text("utf-8")
+
+
+def test_a_replay_asks_for_what_is_marked_and_takes_other_values() -> None:
+    assert EVERYTHING.asked == {(7, "force_un"): ("Force, µN", 50.0)}
+    changed = EVERYTHING.with_values({(7, "force_un"): 30.0})
+    assert changed.step[7].words == "Push to 30 µN"
+    with pytest.raises(ConfigError, match="force_un"):
+        EVERYTHING.with_values({(7, "force_un"): -1.0})
+    assert EVERYTHING.needs_fibre
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ('name = "a"\n[[step]]\nkind = "dance"\n', "kind|tag"),
+        ('name = "a"\n[[step]]\nkind = "pause"\nseconds = -1\n', "seconds"),
+        ('name = "a"\n[[step]]\nkind = "pause"\nseconds = 1\nhops = 2\n', "hops"),
+        ("name = ", "Invalid value"),
+    ],
+)
+def test_a_damaged_file_names_the_key(text: str, why: str, tmp_path: Path) -> None:
+    file = tmp_path / "bad.toml"
+    file.write_text(text, "utf-8")
+    with pytest.raises(ConfigError, match=why):
+        load_recorded(file)
