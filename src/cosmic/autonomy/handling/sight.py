@@ -50,11 +50,16 @@ class ImageWanted:
 
         def look() -> None:
             if self.done:
-                self._forget()
+                self._leave()
                 callback(self)
 
         self._forget = self._camera.on_image(look)
         look()
+
+    def _leave(self) -> None:
+        """Hear of no more images, and let go of who wanted this one: he has it, and it him."""
+        forget, self._forget = self._forget, _nothing
+        forget()
 
     def wait(self, timeout_s: float | None = None) -> CameraImage:
         """Wait for it, and return it.
@@ -81,7 +86,7 @@ class ImageWanted:
 
     def cancel(self) -> None:
         """Want it no longer: nothing was set in motion."""
-        self._forget()
+        self._leave()
         self._late_wall_s = -math.inf
 
 
