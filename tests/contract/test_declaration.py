@@ -464,7 +464,7 @@ def test_a_window_is_never_kept_waiting(remote: Rig) -> None:
         assert wait_until(known)
     finally:
         take_back()
-    assert remote.home.stops == 1
+    assert wait_until(lambda: remote.home.stops == 1)
     assert remote.far.free_bytes(Path("four")) == 40
     assert remote.home.asked == 1
 

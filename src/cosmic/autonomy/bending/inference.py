@@ -9,7 +9,7 @@ summed over grids. So the interval is no symmetrical one, and a depth below zero
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.special import chdtrc, ndtr
@@ -149,25 +149,11 @@ def readings_of(
         By how much the fibre leaves the jaws in another direction than the image shows, and the
         standard deviation of that, rad; by the settings if None.
     """
-    turned, turned_std = direction or (0.0, math.radians(settings.direction_std_deg))
-    rows: list[tuple[int, float, float, float]] = []
-    for number, fit in enumerate(fits):
-        rows.append((number, fit.k_loading_un_um, fit.out_std_part, 1.0))
-        if fit.k_unloading_un_um > 0.0 and math.isfinite(fit.back_std_part):
-            rows.append((number, fit.k_unloading_un_um, fit.back_std_part, -1.0))
-    span = np.array([row[0] for row in rows])
-    k = np.array([row[1] for row in rows])
-    friction_std = settings.friction_std
-    # Friction is taken to be linear; what that leaves out is about its square.
-    bent = np.array([0.5 * (fits[row[0]].by_friction * friction_std) ** 2 for row in rows])
-    stds = np.sqrt(np.array([row[2] for row in rows]) ** 2 + LEAST_STD**2 + bent**2)
-    way = np.array([row[3] for row in rows])
-    noise = np.diag(stds**2)
-    for i in np.flatnonzero(way < 0.0):  # the way out stands before it
-        both = fits[span[i]].ways_correlation * stds[i] * stds[i - 1]
-        noise[i, i - 1] = noise[i - 1, i] = both
-    friction = np.array([fits[n].by_friction for n in span]) * way
-    place = np.array([each.at_um for each in response.shapes])[span]
+    rows = _rows(fits)
+    span = np.array([each.span for each in rows])
+    k = np.array([each.k_un_um for each in rows])
+    sign = np.array([each.sign for each in rows])
+    friction = np.array([fits[n].by_friction for n in span]) * sign
     contact = response.by_contact[span]
     to_common = np.column_stack(
         [
@@ -177,30 +163,22 @@ def readings_of(
             -k,
             contact,
             response.slopes[span],
-            np.array([_aside(fits[n], sign) for n, sign in zip(span, way, strict=True)]),
+            np.array([_aside(fits[each.span], each.sign) for each in rows]),
         ]
     )
     if certified is not None:
         # Glass rubs otherwise than fibres do.
         to_common[:, FRICTION] = 0.0
     apart = contact[:, None] * contact[None, :] * (span[:, None] == span[None, :])
-    own = (
-        ("shear", "um2", -response.by_square[span], settings.shear_um2, settings.shear_std_um2),
-        (
-            "direction of the fibre",
-            "rad",
-            response.by_direction[span],
-            turned,
-            turned_std,
-        ),
-        ("scale of the stage", "", contact * place, 0.0, settings.way_scale_std_part),
-    )
+    own = _own(response, span, settings, direction)
+    if certified is not None:
+        own = (*own[2:], ("friction", "", friction, 0.0, settings.friction_std))
     return Readings(
         log_k=np.log(k),
-        noise=noise,
+        noise=_noise(fits, rows, settings),
         span=span,
         to_common=to_common,
-        own=own if certified is None else (*own[2:], ("friction", "", friction, 0.0, friction_std)),
+        own=own,
         repeat=apart * settings.contact_std_um**2,
         response=response,
         longest=_longest(response),
@@ -208,8 +186,59 @@ def readings_of(
     )
 
 
-def _aside(fit: SpanFit, way: float) -> float:
-    return fit.by_side_out if way > 0.0 else fit.by_side_back
+class _Row(NamedTuple):
+    """One stiffness of one span; `sign` is 1 on the way out and -1 on the way back."""
+
+    span: int
+    k_un_um: float
+    std_part: float
+    sign: float
+
+
+def _rows(fits: Sequence[SpanFit]) -> list[_Row]:
+    """Return what was read of each span: on the way out, then on the way back if there is one."""
+    rows: list[_Row] = []
+    for number, fit in enumerate(fits):
+        rows.append(_Row(number, fit.k_loading_un_um, fit.out_std_part, 1.0))
+        if fit.k_unloading_un_um > 0.0 and math.isfinite(fit.back_std_part):
+            rows.append(_Row(number, fit.k_unloading_un_um, fit.back_std_part, -1.0))
+    return rows
+
+
+def _noise(fits: Sequence[SpanFit], rows: Sequence[_Row], settings: FitSettings) -> Floats:
+    """Return the covariance of the logarithms of what was read, by noise alone."""
+    # Friction is taken to be linear; what that leaves out is about its square.
+    bent = np.array(
+        [0.5 * (fits[each.span].by_friction * settings.friction_std) ** 2 for each in rows]
+    )
+    stds = np.sqrt(np.array([each.std_part for each in rows]) ** 2 + LEAST_STD**2 + bent**2)
+    noise = np.diag(stds**2)
+    for i, row in enumerate(rows):
+        if row.sign < 0.0:  # the way out stands before it
+            both = fits[row.span].ways_correlation * stds[i] * stds[i - 1]
+            noise[i, i - 1] = noise[i - 1, i] = both
+    return noise
+
+
+def _own(
+    response: Response,
+    span: np.ndarray,
+    settings: FitSettings,
+    direction: tuple[float, float] | None,
+) -> tuple[tuple[str, str, Floats, float, float], ...]:
+    """Return what is each fibre's own; see `Readings.own`."""
+    turned, turned_std = direction or (0.0, math.radians(settings.direction_std_deg))
+    at_um = np.array([each.at_um for each in response.shapes])[span]
+    by_scale = response.by_contact[span] * at_um
+    return (
+        ("shear", "um2", -response.by_square[span], settings.shear_um2, settings.shear_std_um2),
+        ("direction of the fibre", "rad", response.by_direction[span], turned, turned_std),
+        ("scale of the stage", "", by_scale, 0.0, settings.way_scale_std_part),
+    )
+
+
+def _aside(fit: SpanFit, sign: float) -> float:
+    return fit.by_side_out if sign > 0.0 else fit.by_side_back
 
 
 def _longest(response: Response) -> int:

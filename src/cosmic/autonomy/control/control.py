@@ -122,22 +122,20 @@ class Control:
         """
         parts = self._parts()
         parts.check_acquisition()
-        if direction not in (1, -1):
-            raise ConfigError(f"direction must be 1 or -1, got {direction!r}")
         settings = parts.settings(travel_um=travel_um, ramp_un_s=ramp_un_s)
-        low, high = parts.force_limits(channel, setpoint_un, limit_un)
-        check_inside(channel, "uN", setpoint_un, (low, high))
-        source = parts.channel(channel, settings, (low, high))
+        limits = parts.force_limits(channel, setpoint_un, limit_un)
+        goal = _force_goal(channel, setpoint_un, limits, direction, settings, tolerance_un)
+        source = parts.channel(channel, settings, limits)
         if source.unit != "uN":
             raise ConfigError(f"{channel} is measured in {source.unit}; a force must be in uN")
-        sink = parts.force_sink(axis, settings)
-        wanted = settings.tolerance(setpoint_un) if tolerance_un is None else tolerance_un
-        if not 0.0 < wanted < math.inf:
-            raise ConfigError(f"tolerance_un must be a number above 0, got {tolerance_un!r}")
-        goal = ForceGoal(setpoint_un, low, high, direction, wanted)
-        servo = ForceServo(goal, settings, gains)
         return self._begin(
-            source, servo, sink, setpoint_un, settings, tolerance=wanted, limits=(low, high)
+            source,
+            ForceServo(goal, settings, gains),
+            parts.force_sink(axis, settings),
+            setpoint_un,
+            settings,
+            tolerance=goal.tolerance_un,
+            limits=limits,
         )
 
     def hold(
@@ -248,3 +246,29 @@ class Control:
             loop.begin()
             self._loops[sink.name] = self._newest = handle
         return handle
+
+
+def _force_goal(
+    channel: str,
+    setpoint_un: float,
+    limits: tuple[float, float],
+    direction: int,
+    settings: ControlSettings,
+    tolerance_un: float | None,
+) -> ForceGoal:
+    """Return what a loop shall hold.
+
+    Raises
+    ------
+    ConfigError
+        A number makes no sense.
+    LimitError
+        The set point does not lie inside the limits.
+    """
+    if direction not in (1, -1):
+        raise ConfigError(f"direction must be 1 or -1, got {direction!r}")
+    check_inside(channel, "uN", setpoint_un, limits)
+    wanted = settings.tolerance(setpoint_un) if tolerance_un is None else tolerance_un
+    if not 0.0 < wanted < math.inf:
+        raise ConfigError(f"tolerance_un must be a number above 0, got {tolerance_un!r}")
+    return ForceGoal(setpoint_un, *limits, direction, wanted)

@@ -170,9 +170,10 @@ def _close(path: Path, head: bytes, hold: FileHold) -> Closing:
                 raise RecordingError("it would not have the same in it")
         except BaseException as exc:
             _write_head(file.fileno(), head)
-            raise RecordingError(
-                f"{path}: cannot be closed ({exc}); it is as it was. Look for a copy"
-            ) from exc
+            if isinstance(exc, Exception):
+                text = f"{path}: cannot be closed ({exc}); it is as it was. Look for a copy"
+                raise RecordingError(text) from exc
+            raise
         file.truncate(end)
         os.fsync(file.fileno())
     summary = f"{path}: closed; {before.seconds:.2f} s of samples"

@@ -2,7 +2,6 @@
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
 from threading import Lock
 from typing import Final, Literal, Protocol, overload, runtime_checkable
 
@@ -33,6 +32,7 @@ from cosmic.mico.api.application_base import PATH_BUDGET_S, MicoApplicationBase
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.collision import Collision
+from cosmic.mico.api.companion import MicoCompanion
 from cosmic.mico.api.entry import Number, as_number, finite, one_line, source_of
 from cosmic.mico.api.foresight import foreseen
 from cosmic.mico.api.group import GroupMovement
@@ -41,7 +41,6 @@ from cosmic.mico.api.news import (
     AxisBegun,
     AxisEnded,
     AxisPositions,
-    AxisRefused,
     MovementNews,
     SentMotion,
     follow_movements,
@@ -60,7 +59,7 @@ from cosmic.mico.core.motion.device import Device
 from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.links import Link
 from cosmic.mico.core.motion.orders import Motion, MoveBy, MoveTo
-from cosmic.mico.core.motion.positioner import Confidence, PositionerState, class_for
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.mico.core.motion.undo import UndoEntry, undo_text
 from cosmic.mico.core.poses import Pose
@@ -139,7 +138,7 @@ class Mico(Declared):
     @override
     def made_companion(self) -> Companion:
         """Follow positions, and stop there what was begun here when something here fails."""
-        return _MicoCompanion(self, self._policy)
+        return MicoCompanion(self, self._policy)
 
     def belong_to(self, application: MicoApplicationBase, source: str = "") -> None:
         """Work for an application at this end; for whoever makes a proxy."""
@@ -770,17 +769,7 @@ class Mico(Declared):
 
     def facts(self) -> PlatformFacts:
         """Return what a trajectory is checked against, as it is known here."""
-        axes = {
-            name: AxisFacts(
-                unit=each.unit,
-                has_sensor=class_for(each.kind, each.positioner).has_sensor,
-                limits=each.limits,
-                most_steps=each.most_steps,
-                frequency_hz=each.frequency_range_hz,
-                amplitude_v=each.amplitude_range_v,
-            )
-            for name, each in self.states().items()
-        }
+        axes = {name: AxisFacts.of(each) for name, each in self.states().items()}
         poses = {each.name: each for each in self.poses}
         return PlatformFacts(self.platform, axes, self.settings.defaults, poses)
 
@@ -998,50 +987,6 @@ class Mico(Declared):
         if model is None:
             raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the station's platform file")
         return model
-
-
-class _MicoCompanion(Companion):
-    """Follows the positions of axes at another station, and minds what was begun here."""
-
-    def __init__(self, mico: Mico, policy: FailurePolicy) -> None:
-        self._mico = mico
-        self._policy = policy
-        self._ends: list[Callable[[], object]] = []
-
-    @override
-    def on_opened(self) -> None:
-        self._ends.append(self._policy.on_safe_stop(self._on_safe_stop))
-        self._ends.append(self._mico.follow_positions(self._on_positions))
-        self._ends.append(self._mico.follow_movements(self._on_movement))
-
-    @override
-    def close(self) -> None:
-        while self._ends:
-            self._ends.pop()()
-
-    def _on_safe_stop(self, reason: str) -> None:
-        """Stop what was begun here, when something here has failed."""
-        if self._mico.moves_remotely and not self._mico.away:
-            self._mico.carry_out(partial(self._mico.stop, reason), self._on_stopped)
-
-    def _on_stopped(self, _result: None, error: CosmicError | None) -> None:
-        if error is not None:
-            self._policy.report(error, "stop was NOT carried out at the station")
-
-    def _on_positions(self, positions: AxisPositions) -> None:
-        axes = self._mico.axes
-        for name, (position, std, read_wall_s) in positions.of.items():
-            axis = axes.get(name)
-            if axis is not None and axis.far is not None:
-                axis.far.move(position, std, read_wall_s)
-                axis.far.changed.emit(axis.details)
-
-    def _on_movement(self, news: MovementNews) -> None:
-        axes = self._mico.axes
-        if isinstance(news, AxisEnded) and news.name in axes:
-            axes[news.name].commander.movement_ended.emit(news.heard())
-        elif isinstance(news, AxisRefused) and not news.together and news.verdict.axis in axes:
-            axes[news.verdict.axis].commander.movement_refused.emit(news.verdict)
 
 
 @runtime_checkable

@@ -16,7 +16,7 @@ from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionMode
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.motion.checks import Limits
 from cosmic.mico.core.motion.manager import DeviceManager
-from cosmic.mico.core.motion.positioner import Confidence, PositionerState, class_for
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.core.poses import PoseBook, pose_misfits
 from cosmic.mico.core.trajectory.binding import AxisFacts, Bound, PlatformFacts
 from cosmic.mico.core.trajectory.clearance import ClearanceSearch
@@ -78,17 +78,7 @@ class TrajectorySite:
 
     def facts(self) -> PlatformFacts:
         """Return what a trajectory is checked against."""
-        axes = {
-            name: AxisFacts(
-                unit=state.unit,
-                has_sensor=class_for(state.kind, state.positioner).has_sensor,
-                limits=state.limits,
-                most_steps=state.most_steps,
-                frequency_hz=state.frequency_range_hz,
-                amplitude_v=state.amplitude_range_v,
-            )
-            for name, state in self.states().items()
-        }
+        axes = {name: AxisFacts.of(state) for name, state in self.states().items()}
         return PlatformFacts(
             name=self.platform,
             axes=axes,

@@ -13,6 +13,7 @@ from cosmic.mico.core.motion.orders import (
     MoveTo,
     Step,
 )
+from cosmic.mico.core.motion.positioner import PositionerState, class_for
 from cosmic.mico.core.poses import Pose
 from cosmic.mico.core.settings import MotionDefaults
 from cosmic.mico.core.trajectory.model import (
@@ -45,6 +46,18 @@ class AxisFacts:
     most_steps: int = COMMON.most_steps
     frequency_hz: tuple[int, int] = COMMON.frequency_hz
     amplitude_v: tuple[float, float] = COMMON.amplitude_v
+
+    @classmethod
+    def of(cls, state: PositionerState) -> "AxisFacts":
+        """Return what is known of an axis."""
+        return cls(
+            unit=state.unit,
+            has_sensor=class_for(state.kind, state.positioner).has_sensor,
+            limits=state.limits,
+            most_steps=state.most_steps,
+            frequency_hz=state.frequency_range_hz,
+            amplitude_v=state.amplitude_range_v,
+        )
 
 
 @dataclass(frozen=True, slots=True)
