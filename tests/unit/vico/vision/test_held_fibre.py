@@ -1,8 +1,11 @@
 """A held fibre is measured from the jaws' front on."""
 
+from contextlib import suppress
+
 import cv2
 import numpy as np
 import pytest
+from benchmarks.twin_image import Set
 
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.api import find_fibres
@@ -57,6 +60,42 @@ def test_the_slope_at_the_clamp_is_that_of_the_fibre() -> None:
     back = np.array([FRONT_PX - 0.5, MIDDLE_PX - 0.5]) - 8.0 * np.array([1.0, 0.15])
     shape = held(arc((float(back[0]), float(back[1])), angle, 320.0, 0.0))
     assert shape.clamps[0].angle_deg == pytest.approx(np.degrees(angle), abs=0.6)
+
+
+@pytest.mark.parametrize(("magnification", "part"), [(1.0, 0.003), (2.0, 0.002)])
+def test_the_held_fibre_of_the_twin_is_free_from_the_jaws_on(
+    magnification: float, part: float
+) -> None:
+    stage = Set()
+    stage.look(magnification, 700.0)
+    stage.now_s += 1.0
+    image = np.asarray(stage.optics.render(stage.now_s))
+    view, tips = stage.optics.projection(stage.now_s), stage.scene.tips(stage.now_s)
+    at = {
+        name: view.image_px(np.array([tips[f"left.{name}"]]))[0]
+        for name in ("hold", "jaw_a", "jaw_b")
+    }
+    (true,) = (
+        view.image_px(line)
+        for line in stage.optics.centre_lines_um(stage.now_s)
+        if line[0, 2] > 300.0
+    )
+    gap = float(abs(at["jaw_b"] - at["jaw_a"])[1])
+    hold = (float(at["hold"][0]), float(at["hold"][1]))
+    gripper = find_gripper(
+        image, ExpectedTool(hold, (1.0, 0.0), 100.0 * view.px_um, gap_px=gap, reach_px=30.0)
+    )
+    assert isinstance(gripper, GripperTips)
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(true, axis=0), axis=1))])
+    free = way[-1] - np.interp(gripper.hold_px[0], true[:, 0], way)
+    shapes = []
+    for fibre in find_fibres(image):
+        with suppress(NotAvailable):
+            shapes.append(held_shape(fibre, gripper))
+    assert [shape.length_px for shape in shapes] == pytest.approx([free], rel=part)
+    slope = np.degrees(np.arctan2(*(true[-1] - true[-2])[::-1]))
+    pointing = np.degrees(np.arctan2(*gripper.jaws[0].forward[::-1]))
+    assert shapes[0].clamps[0].angle_deg == pytest.approx(slope - pointing, abs=0.5)
 
 
 def test_a_fibre_far_off_is_not_taken_for_the_held_one() -> None:

@@ -11,16 +11,37 @@ from typing import Final
 import numpy as np
 
 from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.vico.core.vision import axial, beyond, certainty, checks
+from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.grey import Floats
+from cosmic.vico.core.vision.profiles import Flags
 from cosmic.vico.core.vision.smoothing import arc_lengths, resampled
 from cosmic.vico.core.vision.tool_types import GripperTips
 
 SHADE_WIDTHS: Final = 1.0
-SHADE_PX: Final = 4.0
-FITTED_WIDTHS: Final = 5.0
-FITTED_PX: Final = 24.0
+SHADE_PX: Final = 10.0
+NEAR_PX: Final = 16.0
+"""So much farther than a width from the front an end may be lost in the jaws' shade."""
+FITTED_WIDTHS: Final = 7.0
+FITTED_PX: Final = 40.0
 STEP_PX: Final = 1.0
+OF_THE_JAWS: Final = frozenset(
+    {
+        EndKind.BORDER.value,
+        EndKind.BODY.value,
+        EndKind.LOST.value,
+        axial.GAP,
+        axial.DOUBLED,
+        axial.STEP,
+        beyond.GOES_ON,
+        beyond.SOFT,
+        certainty.IMPROBABLE,
+        checks.CONTINUES,
+        checks.LEFT_OVER,
+    }
+)
+"""What jaws do to the line of a fibre that they hold; that it is one is known."""
 FEWEST: Final = 8
 
 
@@ -58,7 +79,7 @@ class HeldShape:
     clamps : tuple of Clamp
         One, or one for each gripper.
     doubts : tuple of str
-        Those of the grippers' tips, and of the fibre but that it runs into something wider.
+        Those of the grippers' tips, and of the fibre but for what jaws do to its line.
     """
 
     line_px: Floats
@@ -77,8 +98,9 @@ def held_shape(fibre: Fibre, gripper: GripperTips, other: GripperTips | None = N
         The fibre does not come out between the jaws.
     """
     line = resampled(fibre.centre_line_px, STEP_PX)
-    ends_std = float(max(fibre.ends_std_px))
     free, first = _cut(line, gripper, fibre.width_px)
+    away = np.linalg.norm(fibre.ends_px - free[-1], axis=1)
+    ends_std = float(fibre.ends_std_px[int(np.argmin(away))])
     clamps = [first]
     if other is not None:
         back, last = _cut(free[::-1], other, fibre.width_px)
@@ -88,7 +110,7 @@ def held_shape(fibre: Fibre, gripper: GripperTips, other: GripperTips | None = N
     length = float(arc_lengths(free)[-1])
     std = float(np.hypot(np.hypot(gripper.std_px, ends_std), 2e-4 * length))
     doubts = [*gripper.doubts, *(other.doubts if other is not None else ())]
-    doubts += [each for each in fibre.doubts if "runs into something wider" not in each]
+    doubts += [each for each in fibre.doubts if each not in OF_THE_JAWS]
     return HeldShape(free, length, std, tuple(clamps), tuple(dict.fromkeys(doubts)))
 
 
@@ -103,21 +125,32 @@ def _cut(line: Floats, gripper: GripperTips, width: float) -> tuple[Floats, Clam
     ahead = (line - hold) @ forward
     aside = np.abs((line - hold) @ np.array([-forward[1], forward[0]]))
     reach = 0.5 * gripper.gap_px + 0.5 * max(jaw.width_px for jaw in gripper.jaws) + width
-    crossings = np.flatnonzero(((ahead[:-1] <= 0) != (ahead[1:] <= 0)) & (aside[:-1] <= reach))
-    if not len(crossings):
-        raise NotAvailable("held fibre: no fibre comes out between the jaws; look at the image")
-    at = int(crossings[np.argmin(aside[crossings])])
-    out = line[at + 1 :] if ahead[at + 1] > 0 else line[at::-1]
+    out = _coming_out(line, ahead, aside <= reach, SHADE_WIDTHS * width + NEAR_PX)
+    s = float((out[0] - hold) @ forward) + arc_lengths(out)
     skip = SHADE_WIDTHS * width + SHADE_PX
-    s = arc_lengths(out)
-    used = (s >= skip) & (s <= skip + max(FITTED_WIDTHS * width, FITTED_PX))
+    used = (s >= skip) & (s <= max(skip, float(s[0])) + max(FITTED_WIDTHS * width, FITTED_PX))
     if used.sum() < FEWEST:
         raise NotAvailable("held fibre: too little of it is free to be measured")
     return _leaving(out, s, used, hold, forward)
 
 
+def _coming_out(line: Floats, ahead: Floats, beside: Flags, near: float) -> Floats:
+    """Return the part of a line that is ahead of the front, from there on."""
+    crosses = ((ahead[:-1] <= 0) != (ahead[1:] <= 0)) & beside[:-1]
+    crossings = np.flatnonzero(crosses)
+    if len(crossings):
+        at = int(crossings[-1] if ahead[-1] > 0 else crossings[0])
+        return line[at + 1 :] if ahead[at + 1] > 0 else line[at::-1]
+    # It may be lost in the shade of the jaws shortly before it comes to them.
+    for ends in (line, line[::-1]):
+        first = 0 if ends is line else -1
+        if 0 < ahead[first] <= near and beside[first]:
+            return ends
+    raise NotAvailable("held fibre: no fibre comes out between the jaws; look at the image")
+
+
 def _leaving(
-    out: Floats, s: Floats, used: np.ndarray, hold: Floats, forward: Floats
+    out: Floats, s: Floats, used: Flags, hold: Floats, forward: Floats
 ) -> tuple[Floats, Clamp]:
     """Return a line that begins at the front, found by a parabola through what is near it."""
     side = np.array([-forward[1], forward[0]])
