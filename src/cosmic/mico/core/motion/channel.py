@@ -6,7 +6,7 @@ from functools import partial
 
 from typing_extensions import override
 
-from cosmic.frame.errors import CosmicError, DeviceError, MoveCancelled, refusal
+from cosmic.frame.errors import CosmicError, DeviceError, MoveCancelled, NotAvailable, refusal
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.motion.channel_context import ChannelContext
 from cosmic.mico.core.motion.channel_speed import ChannelSpeed, quietly
@@ -15,10 +15,11 @@ from cosmic.mico.core.motion.gate import GateQuery
 from cosmic.mico.core.motion.group_start import StartingAxis
 from cosmic.mico.core.motion.jog import SLOWER, JogRun, SteerRun
 from cosmic.mico.core.motion.lease import Guard
-from cosmic.mico.core.motion.messages import CheckedMove, GroupMoveSent, Order
+from cosmic.mico.core.motion.messages import CheckedMove, GroupMoveSent, Order, SetUp
 from cosmic.mico.core.motion.motion_monitor import ActiveMove, MotionMonitor
 from cosmic.mico.core.motion.orders import Jog, Motion, MoveBy, MoveTo, Reservation, Steer
-from cosmic.mico.core.motion.positioner import PositionerBase
+from cosmic.mico.core.motion.positioner import Confidence, PositionerBase
+from cosmic.mico.hw.interface import Direction
 
 logger = logging.getLogger(__name__)
 
@@ -121,6 +122,42 @@ class ChannelController:
         """Limit the closed-loop speed; a jog, or one that arrives with others, keeps its own."""
         own = self.monitor.active is not None and self.monitor.active.has_own_speed
         self.speed.set_usual(frequency_hz, now=not own)
+
+    def set_up(self, message: SetUp, *, asked: bool) -> None:
+        """Store what is connected while the axis is stationary, and say what has to be done then.
+
+        Parameters
+        ----------
+        asked : bool
+            The gate decides on an order for this channel just now.
+        """
+        state, controller = self._positioner.state, self._context.controller
+        container, channel = self._context.container, message.channel
+        if not state.present:
+            message.done.fail(NotAvailable(f"{self.name}: there is no axis to set up"))
+            return
+        reserved = asked or self.name in self._context.gate.held()
+        moving = self.monitor.active is not None or state.in_motion or not state.activity.at_rest
+        if reserved or moving:
+            text = f"{self.name}: it is moving; set it up when it is stationary"
+            message.done.fail(NotAvailable(text))
+            return
+        address = container.address(channel)
+        try:
+            if isinstance(message.change, Direction):
+                controller.set_safe_direction(address, message.change)
+                container.update(channel, safe_direction=message.change)
+            else:
+                controller.set_sensor_type(address, message.change)
+                text = f"type {message.change} was set: press Rescan, then calibrate and reference"
+                container.update(channel, present=False, error=text)
+        except DeviceError as exc:
+            message.done.fail(exc)
+            return
+        container.update(channel, confidence=Confidence.UNKNOWN)
+        logger.warning("%s: set up anew: %s", self.name, message.change)
+        self._context.reports.state(channel)
+        message.done.finish()
 
     # Start
 

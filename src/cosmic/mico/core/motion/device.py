@@ -45,7 +45,7 @@ from cosmic.mico.core.motion.messages import (
     StopAll,
     Wake,
 )
-from cosmic.mico.core.motion.positioner import Confidence, CountedTravel, PositionerState
+from cosmic.mico.core.motion.positioner import CountedTravel, PositionerState
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import (
     Channel,
@@ -497,36 +497,13 @@ class Device(WorkerThread):
             axis.set_frequency(message.frequency_hz)
 
     def _on_set_up(self, message: SetUp) -> None:
-        """Store it while the axis is stationary, and say what has to be done then."""
-        container, controller = self.container, self._context.controller
-        axis, state = self._channels.get(message.channel), container.state(message.channel)
-        if axis is None or state is None or not state.present:
+        axis = self._channels.get(message.channel)
+        if axis is None:
             where = f"device {self.index} channel {message.channel}"
             message.done.fail(NotAvailable(f"{where}: there is no axis to set up"))
             return
         asked = any(each.channel == message.channel for each in self._queries.orders)
-        reserved = asked or state.name in self._context.gate.held()
-        moving = axis.monitor.active is not None or state.in_motion or not state.activity.at_rest
-        if reserved or moving:
-            text = f"{state.name}: it is moving; set it up when it is stationary"
-            message.done.fail(NotAvailable(text))
-            return
-        address = container.address(message.channel)
-        try:
-            if isinstance(message.change, Direction):
-                controller.set_safe_direction(address, message.change)
-                container.update(message.channel, safe_direction=message.change)
-            else:
-                controller.set_sensor_type(address, message.change)
-                text = f"type {message.change} was set: press Rescan, then calibrate and reference"
-                container.update(message.channel, present=False, error=text)
-        except DeviceError as exc:
-            message.done.fail(exc)
-            return
-        container.update(message.channel, confidence=Confidence.UNKNOWN)
-        logger.warning("%s: set up anew: %s", state.name, message.change)
-        self._context.reports.state(message.channel)
-        message.done.finish()
+        axis.set_up(message, asked=asked)
 
     def _on_order(self, order: Order) -> None:
         axis = self._discovery.channels.get(order.channel)
