@@ -11,15 +11,18 @@ from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.calibrating.settings import CalibrationSettings
 from cosmic.autonomy.campaign.opening import read_recipe
 from cosmic.autonomy.campaign.recipe import (
+    ClimateSettings,
     OutputSettings,
     RecipeFile,
     SampleSettings,
+    SensorSettings,
     TwinChoice,
     load_recipe,
     shipped_recipes,
 )
 from cosmic.autonomy.campaign.report_table import COLUMNS
 from cosmic.autonomy.campaign.stop_rule import StopSettings
+from cosmic.autonomy.handling.settings import StandardSettings
 from system.config_tables import rows
 from system.docs_blocks import ROOT, blocks
 from system.test_docs_reference import section
@@ -29,7 +32,10 @@ TABLES: Final[dict[str, type[BaseModel]]] = {
     "[sample]": SampleSettings,
     "[stop]": StopSettings,
     "[output]": OutputSettings,
+    "[climate]": ClimateSettings,
+    "[sensor]": SensorSettings,
     "[twin]": TwinChoice,
+    "[parameters.standard]": StandardSettings,
     "[parameters.push.spans]": SpanLimits,
     "[parameters.push.fit]": FitSettings,
     "[parameters.calibration]": CalibrationSettings,

@@ -55,6 +55,8 @@ class Platform:
         Applications of other packages that run here, by name.
     failed : mapping of str to str
         Why an application that the platform file names is not there.
+    sample : str
+        What lies on the simulated plate; empty for the fibres that twin.toml lists.
     """
 
     file: PlatformFile
@@ -70,6 +72,7 @@ class Platform:
     scene: Scene | None = None
     others: Mapping[str, CosmicApplicationBase] = field(default_factory=dict)
     failed: Mapping[str, str] = field(default_factory=dict)
+    sample: str = ""
 
     @property
     def simulated(self) -> bool:
@@ -257,6 +260,7 @@ def build_platform(
             scene=scene,
             others=own.others,
             failed=own.failed,
+            sample=sample or "",
         )
         undo.callback(platform.shut_down)
         platform.begin_remote()

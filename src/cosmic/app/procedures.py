@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cosmic.app.platform import Platform, stopped_since
+from cosmic.app.provenance import commit, provenance_of
 from cosmic.autonomy.calibrating.registry import CalibrationRegistry
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.opening import CampaignHost, open_campaign, read_recipe
@@ -38,7 +39,13 @@ def campaign_on(
         rate=platform.clock.rate,
         seed=platform.seed if platform.simulated else 0,
         world=platform.world if platform.simulated else "",
-        versions={"CoSMic": __version__, "Python": computer.python_version()},
+        sample=platform.sample if platform.simulated else "",
+        versions={
+            "CoSMic": __version__,
+            "Python": computer.python_version(),
+            "commit": commit() or "unknown",
+        },
+        provenance=provenance_of(platform, read),
     )
     return open_campaign(read, Path(folder), host)
 

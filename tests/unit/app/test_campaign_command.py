@@ -51,7 +51,9 @@ def recipe(tmp_path: Path) -> Path:
 @pytest.fixture
 def platforms(monkeypatch: pytest.MonkeyPatch, qapp: object) -> SimpleNamespace:
     """Stands for the platform: what it was begun with, and how the campaign on it ends."""
-    made = SimpleNamespace(seeds=[], worlds=[], phase=CampaignPhase.ENDED, start=lambda: None)
+    made = SimpleNamespace(
+        seeds=[], worlds=[], phase=CampaignPhase.ENDED, start=lambda: None, shortfall=""
+    )
 
     @contextmanager
     def connect(*_: object, seed: int, world: str | None, **__: object) -> Iterator[Any]:
@@ -59,6 +61,7 @@ def platforms(monkeypatch: pytest.MonkeyPatch, qapp: object) -> SimpleNamespace:
         made.worlds.append(world)
         campaign = SimpleNamespace(
             phase=made.phase, over=True, end_reason="so it was", operation="", left_s=math.nan,
+            shortfall=made.shortfall,
             progress=progress((), 3.0), start=lambda: made.start(), join=lambda: None,
         )  # fmt: skip
         yield SimpleNamespace(campaign=lambda *_: campaign, simulated=True)
@@ -84,6 +87,19 @@ def test_the_exit_code_is_0_only_when_it_did_what_was_asked(
     assert main(["campaign", str(recipe), "--out", str(tmp_path / "out")]) == code
     printed = capsys.readouterr()
     assert "so it was" in (printed.err if code else printed.out)
+
+
+def test_a_campaign_that_ended_without_its_standard_did_not_do_what_was_asked(
+    recipe: Path,
+    tmp_path: Path,
+    platforms: SimpleNamespace,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    platforms.shortfall = "the standard did not verify the scale of the force"
+    assert main(["campaign", str(recipe), "--out", str(tmp_path / "out")]) == 4
+    assert "so it was; the standard did not verify" in capsys.readouterr().err
+    platforms.phase = CampaignPhase.STOPPED
+    assert main(["campaign", str(recipe), "--out", str(tmp_path / "out")]) == 3
 
 
 def test_the_seed_given_is_the_one_recorded_reported_and_printed(

@@ -25,6 +25,7 @@ logger = logging.getLogger(__name__)
 LOG: Final = "cosmic.log"
 _EVERY_S: Final = 0.5
 _BAR: Final = 24
+_INCOMPLETE: Final = 4
 _CODES: Final = {CampaignPhase.ENDED: 0, CampaignPhase.FAILED: 1, CampaignPhase.STOPPED: 3}
 
 
@@ -75,7 +76,10 @@ def run(chosen: argparse.Namespace) -> int:
     for path in write_output(chosen.out, recipe.file.output):
         sys.stdout.write(f"{path}\n")
     code = _CODES[campaign.phase]
-    text = f"{recipe.name}: {campaign.end_reason}\n"
+    if code == 0 and campaign.shortfall:
+        code = _INCOMPLETE
+    reason = "; ".join(filter(None, (campaign.end_reason, campaign.shortfall)))
+    text = f"{recipe.name}: {reason}\n"
     (sys.stderr if code else sys.stdout).write(text)
     return code
 

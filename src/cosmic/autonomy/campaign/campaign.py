@@ -135,6 +135,7 @@ class Campaign:
         self._broken: CosmicError | None = None
         self._end_reason = ""
         self._reached = False
+        self._shortfall = ""
         self._recorded = 0
         self._unwritten = False
         self._stuck = 0
@@ -178,6 +179,11 @@ class Campaign:
     def end_reason(self) -> str:
         """Why it ended; empty before."""
         return self._end_reason
+
+    @property
+    def shortfall(self) -> str:
+        """What is missing of what was asked for, though the campaign has ended; empty: nothing."""
+        return self._shortfall
 
     @property
     def unfinished(self) -> bool:
@@ -314,7 +320,7 @@ class Campaign:
         self.work.close()
         try:
             self._recorder.close(self._end_reason)
-            finish(self.store)
+            self._analyse()
         except CosmicError as exc:
             failed, self._end_reason = True, f"{self._end_reason}; {exc}"
         finally:
@@ -325,6 +331,18 @@ class Campaign:
         self._operation = ""
         self._enter(CampaignPhase.FAILED if failed else end)
         self._publish()
+
+    def _analyse(self) -> None:
+        """Put final values into the record, and see whether all is there that was asked for."""
+        analysis = finish(self.store)
+        self._recorder.read_again()
+        if self._treatment.standard is not None and not (analysis and analysis.scale.verified):
+            self._shortfall = "the standard did not verify the scale of the force"
+        elif self._reached and not self._rule.reason(self.progress):
+            self._shortfall = (
+                f"by the final analysis {self.progress.good} fibres are good, fewer than the "
+                "campaign had come to itself"
+            )
 
     def _treat_all(self) -> str:
         if self._known is not None:

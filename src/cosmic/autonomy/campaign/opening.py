@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from cosmic.autonomy.campaign.campaign import Campaign, Treatment
+from cosmic.autonomy.campaign.provenance import Provenance, write_provenance
 from cosmic.autonomy.campaign.recipe import Recipe, asks_the_same, load_recipe
 from cosmic.autonomy.campaign.records import TWIN, CampaignError, CampaignInfo
 from cosmic.autonomy.campaign.resume import ResumePlan, resume
@@ -39,6 +40,10 @@ class CampaignHost:
         Of everything random in the twin that runs: what is recorded, whatever the recipe says.
     world : str
         The twin's; empty on hardware.
+    sample : str
+        What lies on the twin's plate.
+    provenance : Provenance
+        What the run is made with, for the record.
     """
 
     rig: Applications
@@ -48,6 +53,8 @@ class CampaignHost:
     rate: float = 1.0
     seed: int = 0
     versions: Mapping[str, str] = field(default_factory=dict)
+    sample: str = ""
+    provenance: Provenance = field(default_factory=Provenance)
     world: str = ""
 
 
@@ -107,6 +114,7 @@ def open_campaign(recipe: Recipe, folder: Path, host: CampaignHost) -> Campaign:
         undo.callback(work.close)
         store, known = _store(recipe, folder, host, work.clock.now_s())
         undo.callback(store.close)
+        write_provenance(folder, store.run, host.provenance, recipe.text)
         campaign = Campaign(
             work,
             Treatment(
@@ -178,12 +186,20 @@ def recorded(folder: Path) -> CampaignInfo | None:
     return CampaignReader(folder).info() if (folder / DATABASE).exists() else None
 
 
+def _sample_words(recipe: Recipe, host: CampaignHost) -> str:
+    """Return what lay on the plate: what truly did, where the recipe names another sample."""
+    said = recipe.file.sample
+    if host.sample and host.sample != said.name:
+        return host.sample
+    return said.description or said.name
+
+
 def _info(recipe: Recipe, host: CampaignHost) -> CampaignInfo:
     file = recipe.file
     return CampaignInfo(
         name=recipe.name,
         procedure=file.procedure,
-        sample=file.sample.description or file.sample.name,
+        sample=_sample_words(recipe, host),
         recipe_text=recipe.text,
         started=datetime.now().astimezone().isoformat(timespec="seconds"),
         description=file.description,

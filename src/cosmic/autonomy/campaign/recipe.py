@@ -30,6 +30,35 @@ class SampleSettings(StrictModel):
     description: str = ""
 
 
+class ClimateSettings(StrictModel):
+    """The air of the room, as it was read when the campaign began; for the record.
+
+    Attributes
+    ----------
+    temperature_c, rh_percent : float or None
+        None where nobody read it.
+    """
+
+    temperature_c: float | None = Field(None, gt=-40.0, lt=80.0)
+    rh_percent: float | None = Field(None, ge=0.0, le=100.0)
+
+
+class SensorSettings(StrictModel):
+    """Which force sensor it is, for the record.
+
+    Attributes
+    ----------
+    serial, certificate : str
+        Its number, and that of its certificate.
+    calibrated : str
+        When the certificate was given.
+    """
+
+    serial: str = ""
+    certificate: str = ""
+    calibrated: str = ""
+
+
 class OutputSettings(StrictModel):
     """What is kept and made besides the records."""
 
@@ -65,6 +94,8 @@ class RecipeFile(StrictModel):
     description: str = ""
     operator: str = ""
     sample: SampleSettings = SampleSettings()
+    climate: ClimateSettings = ClimateSettings()
+    sensor: SensorSettings = SensorSettings()
     stop: StopSettings
     parameters: dict[str, Any] = Field(default_factory=dict)
     output: OutputSettings = OutputSettings()

@@ -429,6 +429,10 @@ class FibreRecorder:
         fibre.images.clear()
         self.fibres = self.store.reader.fibres()
 
+    def read_again(self) -> None:
+        """Take the fibres as their final analysis has them."""
+        self.fibres = self.store.reader.fibres()
+
     def close(self, reason: str) -> None:
         """Write the calibrations and why the campaign ended.
 
@@ -447,6 +451,7 @@ class FibreRecorder:
                     each.residual,
                     each.unit,
                     _made_words(arm, name) or f"{began} + {each.time_s:.0f} s",
+                    self._ended_s - each.time_s,
                 )
                 for arm in self._work.arms
                 for name, each in arm.calibration.made.items()

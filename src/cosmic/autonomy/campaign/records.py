@@ -199,12 +199,15 @@ class CalibrationNote:
         How well it fits, such as 0.4 "um".
     made : str
         When, ISO 8601.
+    age_s : float
+        How old it was in the end, on the platform's clock; nan where that is not known.
     """
 
     name: str
     residual: float
     unit: str
     made: str
+    age_s: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ What it tells stands in `templates/report_body.html`; here are the data and the 
 
 import base64
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -35,6 +35,7 @@ from cosmic.autonomy.campaign.formatting import (
     width_words,
     with_interval,
 )
+from cosmic.autonomy.campaign.provenance import read_provenance
 from cosmic.autonomy.campaign.records import (
     TWIN,
     CalibrationNote,
@@ -100,6 +101,9 @@ class ReportData:
     calibrations: tuple[CalibrationNote, ...]
     operations: tuple[OperationTime, ...]
     scale: ForceScale | None
+    runs: tuple[dict[str, Any], ...]
+    raw: Mapping[int, tuple[Path, str]]
+    folder: Path
     whole: Callable[[int], FibreRecord]
 
 
@@ -141,6 +145,9 @@ def report_data(reader: CampaignReader) -> ReportData:
         calibrations=reader.calibrations(),
         operations=operation_times(finished),
         scale=scale_in(reader.analysis()),
+        runs=read_provenance(reader.folder),
+        raw=reader.raw_files(),
+        folder=reader.folder,
         whole=lambda number: _whole(reader, number, finished),
     )
 
@@ -216,6 +223,8 @@ def _render(template: str, data: ReportData, *, svg: ShowSvg, png: ShowPng) -> s
             failures=drawn(bars("Failures by cause", causes) if causes else "", 430),
             operation_bars=drawn(_operation_bars(data), 560),
             operation_rows=[_operation_row(each) for each in data.operations],
+            record_rows=_record_rows(data),
+            file_rows=_file_rows(data),
             standard_rows=_standard_rows(data.scale),
             calibration_rows=[_calibration_row(each) for each in data.calibrations],
             cards=_cards(data, svg, png),
@@ -319,7 +328,40 @@ def _operation_row(each: OperationTime) -> tuple[str, ...]:
 
 def _calibration_row(each: CalibrationNote) -> tuple[str, ...]:
     residual = f"{each.residual:.3g} {each.unit.replace('um', 'µm')}"
-    return each.name, residual, when(each.made)
+    return each.name, residual, when(each.made), duration(each.age_s)
+
+
+def _record_rows(data: ReportData) -> list[tuple[str, str]]:
+    """Return what the last run was made with."""
+    if not data.runs:
+        return []
+    last = data.runs[-1]
+    climate, sensor = last.get("climate", {}), last.get("sensor", {})
+    air = [
+        f"{climate[key]:g} {unit}"
+        for key, unit in (("temperature_c", "°C"), ("rh_percent", "% relative humidity"))
+        if climate.get(key) is not None
+    ]
+    named = [f"{key} {value}" for key, value in sensor.items() if value]
+    software = last.get("software", {})
+    return [
+        ("Runs", str(len(data.runs))),
+        ("Climate", ", ".join(air) or "not read"),
+        ("Force sensor", ", ".join(named) or "not named"),
+        ("Commit", str(software.get("commit") or "unknown")),
+        ("System", str(software.get("system", NONE))),
+        (
+            "Packages",
+            ", ".join(f"{name} {value}" for name, value in software.get("packages", {}).items()),
+        ),
+    ]
+
+
+def _file_rows(data: ReportData) -> list[tuple[str, str]]:
+    if not data.runs:
+        return []
+    files = data.runs[-1].get("files", {})
+    return [(name, kept["sha256"]) for name, kept in files.items() if "copy" in kept]
 
 
 def budget_rows(result: BendingResult) -> list[tuple[str, ...]]:
@@ -385,6 +427,8 @@ class _Card:
     """One fibre as the template shows it."""
 
     record: FibreRecord
+    raw: str
+    sha256: str
     figures: list[Markup]
     span_rows: list[tuple[str, ...]]
     budget_rows: list[tuple[str, ...]]
@@ -398,7 +442,9 @@ def _cards(data: ReportData, svg: ShowSvg, png: ShowPng) -> Iterator[_Card]:
         figures += [Markup(svg(figure, 430)) for figure in drawn if figure]
         rows = [] if record.bending is None else _span_rows(record.bending)
         budget = [] if record.bending is None else budget_rows(record.bending)
-        yield _Card(record, figures, rows, budget)
+        path, sha256 = data.raw.get(each.number, (None, ""))
+        raw = "" if path is None else path.relative_to(data.folder).as_posix()
+        yield _Card(record, raw, sha256, figures, rows, budget)
 
 
 def _shown(image: FibreImage, png: ShowPng) -> Markup:

@@ -53,7 +53,7 @@ CREATE TABLE run (
 );
 CREATE TABLE calibration (
     name TEXT NOT NULL, residual REAL, unit TEXT NOT NULL, made TEXT NOT NULL,
-    run INTEGER NOT NULL REFERENCES run
+    run INTEGER NOT NULL REFERENCES run, age_s REAL
 );
 CREATE TABLE fibre (
     number INTEGER PRIMARY KEY, run INTEGER NOT NULL REFERENCES run, outcome TEXT NOT NULL,
@@ -105,6 +105,7 @@ ADDED: Final = {
         "world": "TEXT NOT NULL DEFAULT ''",
         "analysis_json": "TEXT NOT NULL DEFAULT ''",
     },
+    "calibration": {"age_s": "REAL"},
     "fibre": {
         "budget_json": "TEXT NOT NULL DEFAULT '[]'",
         "scale_verified": "INTEGER NOT NULL DEFAULT 0",

@@ -351,6 +351,11 @@ class CampaignStore:
             insert(connection, "run", row)
             self._run = last_number(connection)
 
+    @property
+    def run(self) -> int:
+        """Number of this start of the program; 0 where nothing is gone on with."""
+        return self._run
+
     def close(self) -> None:
         """Let go of the folder; without effect after the first time."""
         self._connection.close()
@@ -513,6 +518,7 @@ class CampaignStore:
                     "residual": each.residual,
                     "unit": each.unit,
                     "made": each.made,
+                    "age_s": cell(each.age_s),
                     "run": self._run,
                 }
                 insert(connection, "calibration", row)

@@ -111,9 +111,15 @@ class CampaignReader:
         """Return the calibrations that were in force, oldest first."""
         return tuple(
             CalibrationNote(
-                str(row["name"]), number(row["residual"]), str(row["unit"]), str(row["made"])
+                str(row["name"]),
+                number(row["residual"]),
+                str(row["unit"]),
+                str(row["made"]),
+                number(row.get("age_s")),
             )
-            for row in self._rows("SELECT DISTINCT name, residual, unit, made FROM calibration")
+            for row in self._rows(
+                "SELECT * FROM calibration GROUP BY name, residual, unit, made ORDER BY min(rowid)"
+            )
         )
 
     def fibres(self, role: str = FIBRE) -> tuple[FibreRecord, ...]:
