@@ -182,3 +182,19 @@ def test_what_follows_a_stop_finds_it_carried_out(client: Client) -> None:
             asked.start()
         asked.join()
     assert stops == [STOPPED] * 20
+
+
+def test_what_was_left_and_fails_harms_no_other_call(caplog: pytest.LogCaptureFixture) -> None:
+    lock, done = sim_scu3d_device.LibraryLock(), list[str]()
+
+    def fail() -> None:
+        raise ValueError("this")
+
+    with lock:
+        lock.leave(fail)
+        lock.leave(lambda: done.append("that"))
+        assert not done
+    assert done == ["that"]
+    assert "this" in caplog.text
+    assert lock.acquire(blocking=False)
+    lock.release()

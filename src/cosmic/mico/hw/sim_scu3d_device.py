@@ -1,5 +1,6 @@
 """One simulated controller unit: three channels, one queue, one cable."""
 
+import logging
 import random
 from collections import deque
 from collections.abc import Callable
@@ -20,6 +21,8 @@ from cosmic.mico.hw.sim_scu3d_queue import Packet, PacketQueue
 from cosmic.twin.scene import AtPowerUp, Scene
 from cosmic.twin.settings import StageKind
 from cosmic.twin.stage import Stage
+
+logger = logging.getLogger(__name__)
 
 _ENDS_MOVEMENTS = {
     "overheated": SA_TEMP_OVERHEAT_ERROR,
@@ -72,7 +75,11 @@ class LibraryLock:
 
     def _do_what_is_left(self) -> None:
         while self._left:
-            self._left.popleft()()
+            work = self._left.popleft()
+            try:
+                work()
+            except Exception:  # it is of another call than the one that is under way here
+                logger.exception("what was left with the simulated library's lock failed")
 
 
 class Device:
