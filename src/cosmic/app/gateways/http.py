@@ -440,6 +440,7 @@ class HttpGateway:
                 while True:
                     await self._follow(await _word(socket_), line, ends)
             finally:
+                line.end()
                 sending.cancel()
                 with suppress(asyncio.CancelledError):
                     await sending
@@ -484,6 +485,7 @@ class _Line:
         self._newest: dict[str, Text] = {}
         self._all: list[Text] = []
         self._lost = 0
+        self._over = False
 
     def put(self, topic: str, each: bool, text: Text) -> None:
         """Have it sent; any thread, returns at once."""
@@ -499,9 +501,14 @@ class _Line:
             self._lost += 1
         self._woken.set()
 
+    def end(self) -> None:
+        """Let `run` end: a cancellation alone can be lost in `wait_for` before Python 3.12."""
+        self._over = True
+        self._woken.set()
+
     async def run(self, beat: Callable[[], None]) -> None:
         """Send what comes, until cancelled; `beat` is called while the line stands."""
-        while True:
+        while not self._over:
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._woken.wait(), BEAT_S)
             beat()

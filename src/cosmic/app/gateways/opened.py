@@ -53,7 +53,7 @@ class Gateways:
                 require("epics")
                 from cosmic.app.gateways.epics import EpicsGateway
 
-                epics = EpicsGateway(station, hosts, doors.epics, approve)
+                epics = EpicsGateway(station, hosts, doors.epics)
                 undo.callback(epics.close)
                 self._lines.append(f"EPICS at {epics.address}")
             self._undo = undo.pop_all()

@@ -3,11 +3,12 @@
 import logging
 from contextlib import ExitStack
 from dataclasses import fields
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Final, Protocol, runtime_checkable
 
 from cosmic.app.audit import PlatformAudit
 from cosmic.app.configuration.gateways import Doors
 from cosmic.app.configuration.network import Serving
+from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.opened import Gateways
 from cosmic.app.platform import Platform
 from cosmic.app.stations.facts import ITSELF, StationFacts, StationSide
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from cosmic.frame.network.wire import Wire
 
 logger = logging.getLogger(__name__)
+
+APPROVALS: Final = "approvals"
 
 
 @runtime_checkable
@@ -72,6 +75,7 @@ class StationHost:
         if not sides:
             raise ConfigError(f"{how.name}: no application runs here that could be served")
         self._how = how
+        self._asks_first = doors is not None and doors.http is not None and doors.http.approve
         lease = StationLease(f"the operator at {how.name}")
         self._station = Station(how.name, platform.policy, lease)
         self._applications = tuple(sides)
@@ -88,8 +92,15 @@ class StationHost:
             undo.callback(listener.shut_down)
             listener.start()
             hosts = {name: side for name, side in sides.items() if isinstance(side, Host)}
+            self._approvals = Approvals(platform.policy)
+            undo.callback(self._approvals.close)
+            approvals = Host(APPROVALS, self._approvals)
+            undo.callback(approvals.close)
+            self._station.host(APPROVALS, approvals)
             said = {each.name: getattr(facts, each.name) for each in fields(facts)}
-            self._gateways = Gateways(self._station, hosts, said, doors or Doors())
+            self._gateways = Gateways(
+                self._station, hosts, said, doors or Doors(), self._approvals.ask
+            )
             undo.callback(self._gateways.close)
             self._undo = undo.pop_all()
         logger.info("%s", self.address)
@@ -99,6 +110,16 @@ class StationHost:
         """Its name, what it serves, and where: one line."""
         served = ", ".join(self._applications)
         return f"{self._how.name} serves {served} at {self._how.line.endpoint}"
+
+    @property
+    def approvals(self) -> Approvals:
+        """What programs want to move, where that waits for a person."""
+        return self._approvals
+
+    @property
+    def asks_first(self) -> bool:
+        """What a program moves over HTTP waits for a person."""
+        return self._asks_first
 
     @property
     def gateways(self) -> tuple[str, ...]:

@@ -7,6 +7,8 @@ from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 import cosmic
+from cosmic.app.panels.approvals import TITLE as APPROVALS_TITLE
+from cosmic.app.panels.approvals import ApprovalsPanel
 from cosmic.app.panels.calibrations import CalibrationPanel, add_calibrations
 from cosmic.app.panels.campaign.dock import CAMPAIGN, CampaignDock, can_run
 from cosmic.app.panels.instruments import DAQCO, LENS, instruments_of
@@ -127,6 +129,7 @@ class OperatorWindow(CosmicServerGui):
         if images:
             self.dock(images).raise_()
         self._add_others()
+        self._add_approvals()
         self._lay_out_by_task(settings)
         self._stations = WindowStations(self, platform, host, self._panels_by_application())
         model = self._mico_gui is not None and self._mico_gui.collision.has_model
@@ -192,6 +195,14 @@ class OperatorWindow(CosmicServerGui):
                 self.add_panel(application.title, gui, beside=SCENE if docked else "")
         if docked and self._platform.others:
             self.dock(SCENE).raise_()
+
+    def _add_approvals(self) -> None:
+        """Add what programs want to move, where a person has to approve it."""
+        host = self._host
+        if host is not None and host.asks_first:
+            self._approvals = ApprovalsPanel(host.approvals)
+            self.add_panel(APPROVALS_TITLE, self._approvals)
+            self.closing.connect(self._approvals.end)
 
     def _add_procedures(self) -> None:
         """Add what moves by itself: trajectories, loops, calibrations, campaigns."""
