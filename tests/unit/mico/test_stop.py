@@ -110,6 +110,39 @@ def test_a_stop_that_comes_while_a_movement_is_sent_ends_it_though_nobody_repeat
         assert ("stop", X) in controller.calls
 
 
+def test_a_stop_that_came_and_was_reset_while_a_movement_is_sent_ends_it():
+    with mico(instant=False) as (rig, controller):
+        manager, real = rig.application.manager, controller.move_to
+
+        def move_to(*args, **kwargs):
+            real(*args, **kwargs)
+            manager.latch.set("in between")
+            manager.latch.reset()  # before the device thread can see it latched
+
+        controller.move_to = move_to
+        movement = rig["d0.c0"].move_to(100.0, wait=False)
+        with pytest.raises(cosmic.StoppedError):
+            movement.wait(2)
+        assert X in stops(controller)
+
+
+def test_a_stop_that_is_reset_while_the_device_thread_hangs_still_ends_what_moved():
+    with mico(instant=False) as (rig, controller):
+        moving = rig["d0.c0"].move_to(100.0, wait=False)
+        wait_until(lambda: bool(controller.of("move_to")))
+        controller.block.clear()
+        hanging = rig["d0.c1"].move_to(100.0, wait=False)
+        wait_until(lambda: len(controller.of("move_to")) == 2)
+        rig.application.manager.stop("test")
+        rig.application.manager.reset_stop()
+        controller.calls.clear()
+        controller.block.set()
+        for movement in (moving, hanging):
+            with pytest.raises(cosmic.StoppedError):
+                movement.wait(2)
+        assert X in stops(controller), "the thread repeats the stop, reset or not"
+
+
 def test_stop_from_many_threads_while_all_axes_are_commanded():
     with mico(("LLL", "LLL")) as (rig, controller):
         manager = rig.application.manager
