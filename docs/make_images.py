@@ -194,6 +194,14 @@ def initialise(scene: Scene) -> None:
     scene.wait(1.0)
 
 
+def first_day(scene: Scene) -> None:
+    """Show what a platform misses on its first day."""
+    scene.choose(LOOK)
+    scene.window.raise_panel("First day")
+    scene.wait(2.0)
+    scene.save("first-day")
+
+
 def measure_a_force(scene: Scene) -> None:
     """Show how the limit stopped the probe."""
     _before_the_probe(scene)
@@ -242,6 +250,7 @@ SCENES: Final[dict[str, Callable[[Scene], None]]] = {
     "window-measure": window_measure,
     "window-results": window_results,
     "initialise": initialise,
+    "first-day": first_day,
     "measure-a-force": measure_a_force,
     "scene-refused": scene_refused,
     "steer-with-a-gamepad": steer_with_a_gamepad,
@@ -258,7 +267,7 @@ def main(names: list[str]) -> int:
     end = declare_gui_thread()
     for name in names or list(SCENES):
         with tempfile.TemporaryDirectory() as folder:
-            scene = Scene(app, Path(folder), cold=name == "initialise")
+            scene = Scene(app, Path(folder), cold=name in ("initialise", "first-day"))
             try:
                 SCENES[name](scene)
             finally:

@@ -5,7 +5,7 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -21,6 +21,7 @@ from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.kept_file import write_whole
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.mico import Mico
 from cosmic.mico.hw.interface import Serial
 
 NUDGE: Final[dict[AxisUnit, float]] = {"um": 10.0, "deg": 0.1}
@@ -84,20 +85,27 @@ def run(chosen: argparse.Namespace) -> int:
 
 def found_axes(path: Path) -> tuple[list[FoundAxis], tuple[Serial, ...]]:
     """Open the controllers and return the axes that no entry names, and all serial numbers."""
-    found: list[FoundAxis] = []
     file, _ = load_platform(path)
     with connect(path, applications=("mico",)) as rig:
-        for name in rig.mico.names:
-            place = _MADE_UP.fullmatch(name)
-            if place is not None and name not in file.mico.kinds:
-                axis = rig.mico[name]
-                device, channel = int(place[1]), int(place[2])
-                found.append(FoundAxis(name, device, channel, axis.kind.value, axis.unit))
+        found = unnamed_axes(rig.mico, file.mico.kinds)
         application = rig.mico.application
         if not isinstance(application, MicoApplication):
             raise NotAvailable("axes are set up at the station that has them")
         serials = application.manager.controller.find_devices()
     return found, serials
+
+
+def unnamed_axes(mico: Mico, configured: Container[str]) -> list[FoundAxis]:
+    """Return the axes that were found and that nobody has named, where they stand."""
+    found: list[FoundAxis] = []
+    for name in mico.names:
+        place = _MADE_UP.fullmatch(name)
+        if place is None or name in configured:
+            continue
+        axis = mico[name]
+        device, channel = int(place[1]), int(place[2])
+        found.append(FoundAxis(name, device, channel, axis.kind.value, axis.unit))
+    return found
 
 
 def _looked_at(path: Path, found: Sequence[FoundAxis], *, move: bool) -> Iterator[FoundAxis]:

@@ -11,6 +11,7 @@ from cosmic.app.panels.alarms import AlarmBook, AlarmPanel, Level
 from cosmic.app.panels.calibrations import CALIBRATIONS
 from cosmic.app.panels.campaign.dock import CAMPAIGN, campaigns_folder, can_run
 from cosmic.app.panels.coach import Coach, Rule
+from cosmic.app.panels.first_day import DayStep, FirstDayPanel, FirstDaySteps
 from cosmic.app.panels.force import ForcePanel
 from cosmic.app.panels.history import HistoryPanel
 from cosmic.app.panels.image_bar import ImageBar
@@ -49,6 +50,7 @@ COACH: Final = "Next step"
 IMAGE: Final = "Image"
 CAMERA: Final = "Camera"
 RESULTS: Final = "Results"
+FIRST_DAY: Final = "First day"
 ALARMS: Final = "Alarms"
 HISTORY: Final = "History"
 
@@ -83,6 +85,7 @@ def workspaces(others: tuple[str, ...] = ()) -> tuple[Workspace, ...]:
             "Axes, devices, calibrations and configuration",
             (
                 Place(MICO, _LEFT, share=0.8),
+                Place(FIRST_DAY, _LEFT, tabbed=MICO),
                 Place(CALIBRATIONS, _LEFT, tabbed=MICO),
                 Place(DAQCO, _LEFT, tabbed=MICO),
                 Place(CONTROL, _LEFT, tabbed=MICO),
@@ -174,6 +177,7 @@ class TaskLayout(QObject):
             self.tool.close_gently_requested.connect(self.operations.close_gently)
         self.force = ForcePanel(rig.daqco, gui, self.folder) if instruments.force else None
         self.results = ResultsPanel(self._folders, platform.policy, self._model)
+        self.first_day = FirstDayPanel(self._day_steps())
         self.book = AlarmBook(self)
         self._alarms = AlarmWatch(self.book, sound=platform.file.alarms.sound)
         self._computer = computer_quantities(platform.file.alarms, self.folder.home)
@@ -201,6 +205,7 @@ class TaskLayout(QObject):
         add(IMAGE, self._image, _LEFT, scroll=False)
         add(CAMERA, self._camera, _RIGHT)
         add(RESULTS, self.results, _LEFT, scroll=False)
+        add(FIRST_DAY, self.first_day, _LEFT)
 
     def _make_recorder(self) -> RecorderPanel:
         """Make the panel of recorded procedures, and join it to what carries them out."""
@@ -320,6 +325,24 @@ class TaskLayout(QObject):
     def _on_written(self, path: object) -> None:
         if isinstance(path, Path):
             self._window.drawer.line.set_text(f"written: {path}")
+
+    def _day_steps(self) -> tuple[DayStep, ...]:
+        return FirstDaySteps(
+            self._rig,
+            self._gui,
+            configured=tuple(self._platform.file.mico.kinds),
+            force=self.force is not None,
+            tool=lambda: self.tool.tool.name,
+            camera=lambda: self.stage.camera.camera,
+            folder=self.folder,
+            click=self._try_click,
+        ).steps
+
+    def _try_click(self) -> None:
+        """Show the image, with a click that moves the chosen tool."""
+        if self._window.workspaces is not None:
+            self._window.workspaces.choose(HANDLE)
+        self._on_move_toggled(True)
 
     def _model(self) -> SceneModel | None:
         return self._gui.mico.application.scene

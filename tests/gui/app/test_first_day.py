@@ -1,0 +1,56 @@
+"""The first day: the window says what is missing and what to press, down to the first click."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from cosmic.app.panels.first_day import DayStep, FirstDayPanel, Standing
+from cosmic.frame.errors import NotAvailable
+from cosmic.frame.gui.theme import State
+from gui.app.windows import Make
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+def test_a_step_says_how_far_it_is_and_its_button_carries_it_out(qtbot: QtBot) -> None:
+    done: list[str] = []
+
+    def look() -> Standing:
+        return Standing(State.OK, "done") if done else Standing(State.REFUSED, "missing", "Do it")
+
+    def fail() -> None:
+        raise NotAvailable("the lens is away")
+
+    panel = FirstDayPanel(
+        (
+            DayStep("First", look, lambda: done.append("it")),
+            DayStep("Second", lambda: Standing(State.REFUSED, "no lens", "Home"), fail),
+            DayStep("Third", lambda: Standing(State.BUSY, "looking", "Wait"), fail),
+        )
+    )
+    qtbot.addWidget(panel)
+    panel.show()
+    first, second, third = panel.rows.values()
+    assert (first.badge.state, first.text.text()) == (State.REFUSED, "missing")
+    assert not third.button.isEnabled()
+    qtbot.mouseClick(first.button, LEFT)
+    assert (first.badge.state, first.text.text()) == (State.OK, "done")
+    assert not first.button.isVisible()
+    qtbot.mouseClick(second.button, LEFT)
+    assert "the lens is away" in panel.message.text()
+
+
+def test_a_cold_platform_says_what_is_missing_and_what_to_press(make: Make, qtbot: QtBot) -> None:
+    window = make(applications=("mico", "daqco", "vico"), cold=True)
+    window.raise_panel("First day")
+    tasks = window.tasks
+    assert tasks is not None
+    rows = tasks.first_day.rows
+    qtbot.waitUntil(lambda: rows["Devices"].text.text() == "11 axes answer")
+    assert rows["Names"].badge.state is State.OK
+    qtbot.waitUntil(lambda: rows["Positions"].button.text() == "Initialise")
+    assert "left.x" in rows["Positions"].text.text()
+    qtbot.waitUntil(lambda: rows["Force"].badge.state is State.OK)
+    assert rows["Scale and rotation"].button.text() == "Calibrate"
+    assert rows["First click-to-move"].text.text() == "After scale and rotation"
+    QApplication.processEvents()
