@@ -48,7 +48,7 @@ def test_two_images_give_the_position(model: DefocusModel, sharp_at: float, ligh
     assert found.position == pytest.approx(sharp_at, abs=25.0)
 
 
-def test_what_tells_nothing_is_refused(model: DefocusModel) -> None:
+def test_images_without_detail_are_refused(model: DefocusModel) -> None:
     empty = np.full(SHAPE, 120, np.uint8) + np.random.default_rng(0).integers(0, 3, SHAPE, np.uint8)
     with pytest.raises(NotAvailable, match="detail"):
         in_focus((0.0, empty), (50.0, empty), model)

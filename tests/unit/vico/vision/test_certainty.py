@@ -25,7 +25,7 @@ def test_whole_fibres_stay_certain_and_their_interval_holds_the_length() -> None
 
 
 @pytest.mark.parametrize("kind", PAIRS)
-def test_pairs_that_pixels_tell_apart_are_not_one_certain_fibre(kind: Kind) -> None:
+def test_pairs_that_differ_on_pixels_are_not_one_certain_fibre(kind: Kind) -> None:
     drawn = [one for seed in range(300, 316) if tellable(one := draw(kind, seed))]
     assert len(drawn) >= 5
     assert sum(wrong(drawn_cases(one)) for one in drawn) == 0
