@@ -21,7 +21,7 @@ from cosmic.vico.gui.vico_gui import make_vico_gui
 from gui.app.windows import Make
 
 LEFT = Qt.MouseButton.LeftButton
-LONG_MS = 240_000
+LONG_MS = 600_000
 
 
 def tasks(window: OperatorWindow) -> TaskLayout:
@@ -186,7 +186,7 @@ def test_a_gripper_closes_gently_and_says_how_far_it_is_open(make: Make, qtbot: 
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1500)
 def test_a_fibre_is_picked_up_and_bent_and_recorded_by_fifteen_actions(
     make: Make, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

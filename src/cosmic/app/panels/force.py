@@ -240,6 +240,7 @@ class ForcePanel(QWidget):
         self.unit.setProperty("role", "dim")
         self.bar = LimitBar()
         self.limit = named(ElidedLabel(), "forceLimit")
+        self.limit.setFont(number_font(11))
         self.arm = styled(
             named(push_button("Limit…", "Set, arm or disarm the limit"), "arm"), "narrow"
         )
@@ -501,7 +502,7 @@ class ForcePanel(QWidget):
         if not limit.settings.armed:
             return f"▲ DISARMED {sides} {unit}"
         left = f", {distance(limit, value):.0f} to go" if value is not None else ""
-        return f"ARMED {sides} {unit}{left}"
+        return f"ARMED {sides}{left}" if left else f"ARMED {sides} {unit}"
 
     # Commands
 

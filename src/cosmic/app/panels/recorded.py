@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from PySide6.QtCore import QTimer, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
@@ -132,6 +132,8 @@ class RecorderPanel(QWidget):
         self.frame.currentTextChanged.connect(self._on_frame)
         self.list = named(QListWidget(), "recordedSteps")
         self.list.setAccessibleName("Recorded steps, in order")
+        self.list.setWordWrap(True)
+        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.list.setMinimumHeight(8 * STEP_PX)
         self.list.currentRowChanged.connect(lambda _row: self._show_buttons())
         self.up = self._button("↑", "Move the step up", lambda: self._shift(-1))

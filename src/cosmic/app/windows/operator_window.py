@@ -4,6 +4,7 @@ import logging
 from typing import Final
 
 from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 import cosmic
@@ -20,6 +21,7 @@ from cosmic.app.rig import Rig
 from cosmic.app.stations.host import StationHost
 from cosmic.app.windows.coaching import coach_rules
 from cosmic.app.windows.hint_bar import HintBar, first_steps
+from cosmic.app.windows.park import Parking
 from cosmic.app.windows.stations import WindowStations
 from cosmic.app.windows.tasks import (
     FORCE,
@@ -115,6 +117,7 @@ class OperatorWindow(CosmicServerGui):
         self._mico_gui: MicoWidget | None = None
         self._scene: ScenePanel | None = None
         self._path: PathController | None = None
+        self._parking: Parking | None = None
         self._bridge = WindowBridge()
         self._tasks: TaskLayout | None = None
         self._forget_policy = platform.policy.subscribe(self._bridge.report_failure)
@@ -168,6 +171,8 @@ class OperatorWindow(CosmicServerGui):
             right = Qt.DockWidgetArea.RightDockWidgetArea
             self.add_panel(SCENE, self._scene, right, scroll=False)
         gui.undo_planned.connect(self._scene.set_planned)
+        self._parking = Parking(gui, self._is_moving, self)
+        self._parking.failed.connect(lambda why: self.top_bar.set_message(f"not parked: {why}"))
         self._collision_bar = CollisionBar(self.top_bar, gui, self)
         preview = PathPreview()
         self._scene.set_bar(preview)
@@ -465,6 +470,13 @@ class OperatorWindow(CosmicServerGui):
     def _on_rescan(self, title: str) -> None:
         if title in (MICO, TOOL) and self._mico_gui is not None:
             self._mico_gui.rescan()
+
+    @override
+    def closeEvent(self, event: QCloseEvent) -> None:
+        if self._parking is not None and self._parking.asks():
+            event.ignore()
+            return
+        super().closeEvent(event)
 
     def _on_closing(self) -> None:
         """Leave everything safe; motion ends first, the console with what it waits for next."""
