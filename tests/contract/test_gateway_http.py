@@ -92,6 +92,30 @@ def test_a_command_declared_tomorrow_is_there_without_a_line_of_code() -> None:
     assert tool["inputSchema"]["properties"]["times"]["type"] == "integer"
 
 
+def test_an_assistant_uses_the_same_commands_over_mcp(door: Door) -> None:
+    with door.client() as http:
+
+        def said(method: str, **parameters: Any) -> Any:
+            message = {"jsonrpc": "2.0", "id": 1, "method": method, "params": parameters}
+            return http.post("/mcp", json=message).json()
+
+        assert said("initialize")["result"]["serverInfo"]["name"] == "CoSMic"
+        names = {each["name"] for each in said("tools/list")["result"]["tools"]}
+        assert {"cabinet_stop", "cabinet_lamp_shine", "cabinet_drawers_move"} <= names
+        move = {"name": "cabinet_drawers_move", "arguments": {"drawers_key": "top"}}
+        move["arguments"]["target_um"] = 4.0
+        refused = said("tools/call", **move)["result"]
+        assert refused["isError"]
+        assert "right to move" in refused["content"][0]["text"]
+        http.post("/api/control")
+        assert said("tools/call", **move)["result"]["content"][0]["text"] == "4.0"
+        assert said("tools/call", name="cabinet_emit", arguments={})["error"]["code"] == -32602
+        assert said("nothing")["error"]["code"] == -32601
+        notice = {"jsonrpc": "2.0", "method": "notifications/initialized"}
+        assert http.post("/mcp", json=notice).status_code == 202
+    assert door.home.drawers["top"].moved_um == [4.0]
+
+
 def test_what_moves_needs_the_right_and_goes_through_the_lease(door: Door) -> None:
     with door.client() as http:
         path = "/api/cabinet/drawers/left.x/move"

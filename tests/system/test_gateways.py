@@ -8,6 +8,8 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
 
 import httpx
 import numpy as np
@@ -15,8 +17,11 @@ import pytest
 import tifffile
 
 from contract.station_rig import free_port, wait_until
+from system.docs_blocks import ROOT, blocks
 
 pytestmark = pytest.mark.slow
+TUTORIALS: Final = ROOT / "docs" / "tutorials"
+ADDRESS: Final = "http://127.0.0.1:8470"
 
 OPHYD = """
 import json, sys
@@ -36,7 +41,7 @@ def moved(target, of=motor):
         of.set(target).wait(20)
     except Exception as exc:
         return type(exc).__name__
-    return of.position
+    return float(of.user_readback.get(use_monitor=False))
 
 found = {"without control": moved(5.0)}
 control.put(1, wait=True)
@@ -181,3 +186,38 @@ def test_an_image_over_http_has_its_scale_and_time(served: Served) -> None:
         assert tif.asarray().shape == (1200, 1600)
         assert "AcquisitionDate" in tif.ome_metadata
         assert "left.x_um" in tif.ome_metadata
+
+
+def followed(page: str, served: Served, folder: Path, **words: str) -> None:
+    """Run the blocks of a tutorial one after the other, in a process that has only them."""
+    code = "\n".join(each.text for each in blocks(TUTORIALS / page) if each.language == "python")
+    for word, instead in words.items():
+        code = code.replace(word, instead)
+    variables = {
+        "EPICS_CA_SERVER_PORT": str(served.port),
+        "EPICS_CA_ADDR_LIST": "127.0.0.1",
+        "EPICS_CA_AUTO_ADDR_LIST": "NO",
+        "OPHYD_CONTROL_LAYER": "caproto",
+    }
+    ended = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code],
+        env=os.environ | variables,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert ended.returncode == 0, ended.stderr
+
+
+def test_the_tutorial_of_the_notebook_runs(served: Served, tmp_path: Path) -> None:
+    where = str(served.http.base_url).rstrip("/")
+    followed("from-a-notebook.md", served, tmp_path, TOKEN=served.token, **{ADDRESS: where})
+    assert (tmp_path / "notebook.h5").stat().st_size > 1000
+    with tifffile.TiffFile(tmp_path / "now.tif") as tif:
+        assert tif.is_ome
+
+
+def test_the_tutorial_of_epics_runs(served: Served, tmp_path: Path) -> None:
+    followed("drive-it-from-epics.md", served, tmp_path)

@@ -106,6 +106,17 @@ def _add_audit(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     audit.add_argument("--json", action="store_true", help="lines of JSON, for programs")
 
 
+def _add_session(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    session = commands.add_parser("session", help="put together what a session made")
+    tasks = session.add_subparsers(dest="task", metavar="TASK", required=True)
+    pack = tasks.add_parser("pack", help="one zip file with a description, as RO-Crate")
+    pack.add_argument("sources", type=Path, nargs="+", metavar="FILE_OR_FOLDER")
+    pack.add_argument("--output", type=Path, required=True, metavar="FILE.zip")
+    pack.add_argument("--title", default="", metavar="TEXT", help="title of the session")
+    pack.add_argument("--config", type=Path, default=None, metavar="PATH", help="platform file")
+    pack.add_argument("--audit", action="store_true", help="with this computer's audit trail")
+
+
 def _add_file_commands(
     commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
 ) -> None:
@@ -159,6 +170,7 @@ def _add_file_commands(
         "--apply", action="store_true", help="put the new values into record, report and table"
     )
     _add_audit(commands)
+    _add_session(commands)
     repair = commands.add_parser("repair", help="close recordings that a killed process left open")
     repair.add_argument("recordings", type=Path, nargs="+", metavar="FILE")
     repair.add_argument("--ended", action="store_true", help="no program writes them any more")

@@ -10,9 +10,10 @@ from cosmic.app.gateways.epics_channels import Alarm, Channel, PutRefused, Who
 from cosmic.frame.errors import CosmicError, MoveRefused
 from cosmic.mico.core.motion.positioner import PositionerState
 
-SETTLED_S: Final = 0.05
-"""Between the last position and the end of a put: clients get monitors in bundles."""
-EDGE_S: Final = 0.02
+EDGE_S: Final = 0.05
+"""Between the last position and `DMOV`: clients get monitors in bundles, and in any order."""
+SETTLED_S: Final = 0.03
+"""Between `DMOV` and the end of a put."""
 SMALLEST_STEP: Final = 0.001
 """What `MRES` and the deadband say, in units of the axis."""
 NOMINAL_STEP_UM: Final = 0.5

@@ -25,6 +25,7 @@ from cosmic.app.configuration.gateways import HttpClient, HttpSettings
 from cosmic.app.gateways.catalogue import commands_of
 from cosmic.app.gateways.hub import Hub, Text, Unfollow
 from cosmic.app.gateways.image_files import encoded_image, newest_image, shown_jpeg
+from cosmic.app.gateways.mcp import McpTools
 from cosmic.app.gateways.openapi import described
 from cosmic.app.gateways.plain import to_json
 from cosmic.app.gateways.session import Approve, GatewaySession, Order
@@ -138,6 +139,7 @@ class HttpGateway:
         kinds: dict[str, type[Declared]] = {name: type(each.served) for name, each in hosts.items()}
         self._hub = Hub(station, kinds)
         self._openapi = described(kinds)
+        self._tools = McpTools(kinds)
         self._waiting_s = {
             (name, each.function): each.declared.need.timeout_s
             for name, kind in kinds.items()
@@ -151,8 +153,9 @@ class HttpGateway:
         self._queues = {
             name: JobQueue(f"{name} over HTTP", station.policy) for name in (*hosts, "", "stops")
         }
+        application = self._application()
         self._socket = _listening(settings)
-        self._server = _Server(self._application(), self._socket, settings, station)
+        self._server = _Server(application, self._socket, settings, station)
         self._server.start()
 
     @property
@@ -193,6 +196,7 @@ class HttpGateway:
                 route("/api/files", self._files, "GET"),
                 route("/api/files/{name}", self._file, "GET"),
                 WebSocketRoute("/api/events", self._events),
+                route("/mcp", self._mcp, "POST"),
                 route("/api/{application}/{path:path}", self._state, "GET"),
                 route("/api/{application}/{path:path}", self._command, "POST"),
             ]
@@ -326,6 +330,21 @@ class HttpGateway:
         if isinstance(result, Operation):
             return await self._going_on(request, user, user.keep(result), result)
         return JSONResponse({"result": to_json(result)})
+
+    async def _mcp(self, request: Request, user: _User) -> Response:
+        async def call(
+            application: str, function: str, arguments: dict[str, Any], keys: tuple[str, ...]
+        ) -> object:
+            order = user.session.order(application, function, arguments, keys)
+            queue = "stops" if order.found.mark.at_once else application
+            result = await self._carried_out(request, user, order, queue)
+            if isinstance(result, Operation):
+                await self._watched(request, user, result, LONGEST_WAIT_S)
+                return result.result
+            return result
+
+        answer = await self._tools.answer(await _body(request), call)
+        return Response(status_code=202) if answer is None else JSONResponse(answer)
 
     async def _carried_out(self, request: Request, user: _User, order: Order, queue: str) -> object:
         if queue != "stops" and self._queues[queue].waiting >= MOST_WAITING:

@@ -142,6 +142,11 @@ def mcp_tools(kinds: Kinds) -> list[dict[str, Any]]:
     return [_tool(each) for each in _each(kinds)]
 
 
+def tool_name(command: Command) -> str:
+    """Return what a command is called as a tool, such as "mico_axes_begin"."""
+    return f"{command.place.application}.{command.function}".replace(".", "_")
+
+
 def _each(kinds: Kinds) -> Iterator[Command]:
     for name, kind in kinds.items():
         yield from commands_of(name, kind)
@@ -158,7 +163,7 @@ def _tool(command: Command) -> dict[str, Any]:
         schema["$defs"] = schemas.components
     need = command.declared.need
     return {
-        "name": f"{command.place.application}.{command.function}".replace(".", "_"),
+        "name": tool_name(command),
         "title": command.summary,
         "description": command.text,
         "inputSchema": schema,
