@@ -1,7 +1,6 @@
 """The gate's collision check without its process: for rehearsals, in one thread."""
 
 from collections.abc import Iterable, Mapping, Set
-from typing import Protocol
 
 from typing_extensions import override
 
@@ -50,20 +49,10 @@ class PureAnswers(Answering):
         return clear_travel(self.sweep, spans, axis, ignored)
 
 
-class Exempting(Protocol):
-    """What is left out of the check: a `CollisionManager`, or what is told of one elsewhere."""
-
-    @property
-    def taken_out(self) -> frozenset[str]:
-        """Axes whose movements are not checked."""
-
-    @property
-    def allowed_contacts(self) -> frozenset[str]:
-        """Names of the contacts that are allowed now."""
-
-
-def pure_copy(live: Exempting, answers: PureAnswers, axes: Iterable[str]) -> CollisionManager:
-    """Return a manager that judges as `live` does now, without its process."""
+def pure_copy(
+    live: CollisionManager, answers: PureAnswers, axes: Iterable[str]
+) -> CollisionManager:
+    """Return a manager that answers as `live` does now, without its process."""
     copy = CollisionManager(answers.model, process=answers, axes=axes)
     for axis in live.taken_out:
         copy.take_out(axis, source="rehearsal")
