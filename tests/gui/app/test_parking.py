@@ -55,3 +55,13 @@ def test_closing_asks_nothing_while_a_gripper_may_hold_something(
     window.close()
     assert dialog_of(window) is None
     assert not window.isVisible()
+
+
+def test_the_end_of_the_program_is_not_held_up_by_the_question(
+    window: OperatorWindow, qtbot: QtBot
+) -> None:
+    mico(window).mico.poses.teach("park", ["left.x"])
+    window.close()
+    assert dialog_of(window) is not None
+    window.close_now()
+    assert not window.isVisible()

@@ -471,6 +471,12 @@ class OperatorWindow(CosmicServerGui):
         if title in (MICO, TOOL) and self._mico_gui is not None:
             self._mico_gui.rescan()
 
+    def close_now(self) -> None:
+        """Close without a question, as when the system ends the program."""
+        if self._parking is not None:
+            self._parking.skip()
+        self.close()
+
     @override
     def closeEvent(self, event: QCloseEvent) -> None:
         if self._parking is not None and self._parking.asks():

@@ -78,6 +78,13 @@ class Parking(QObject):
         dialog.show()
         return True
 
+    def skip(self) -> None:
+        """Ask nothing from now on: whoever closes the window cannot answer."""
+        self._answered = True
+        if self.dialog is not None:
+            self.dialog.close()
+            self.dialog = None
+
     def _may_park(self) -> bool:
         mico = self._gui.mico
         try:

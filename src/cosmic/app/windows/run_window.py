@@ -112,7 +112,7 @@ def run_window(options: WindowOptions) -> int:
         at_end.callback(install_hooks(platform.policy))
         window = OperatorWindow(platform, settings, ring, console=not options.only, host=host)
         at_end.callback(window.deleteLater)
-        at_end.enter_context(_closed_by_signals(window.close))
+        at_end.enter_context(_closed_by_signals(window.close_now))
         return _run(app, window, options)
 
 
@@ -221,7 +221,7 @@ class _Photographer(QObject):
         """Save the image and close; what cannot be saved ends the program with an error."""
         if self._file is not None and not self._window.grab().save(str(self._file)):
             self.failed = True
-        self._window.close()
+        self._window.close_now()
 
 
 def _run(app: QApplication, window: OperatorWindow, options: WindowOptions) -> int:
