@@ -10,7 +10,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
 
-import cosmic
 from cosmic.app.platform import Platform
 from cosmic.autonomy.campaign.provenance import Provenance
 from cosmic.autonomy.campaign.recipe import Recipe
@@ -105,7 +104,7 @@ def _packages() -> dict[str, str]:
 
 def commit() -> str:
     """Return the commit that runs, with "changed" where files differ from it; "" if unknown."""
-    git, folder = shutil.which("git"), Path(cosmic.__file__).parent
+    git, folder = shutil.which("git"), Path(__file__).parents[1]
     if git is None:
         return ""
     described = _asked(git, folder, "rev-parse", "HEAD")
