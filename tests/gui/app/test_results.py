@@ -27,6 +27,7 @@ from cosmic.vico.core.recording.formats import ImageFormat
 from cosmic.vico.core.recording.image_file import ImageFile
 from cosmic.vico.core.recording.side_row import row_of
 from cosmic.vico.hw.interface import Frame
+from gui.app.test_workspaces import clipped, overlapping
 
 LEFT = Qt.MouseButton.LeftButton
 RATE_HZ = 1000.0
@@ -344,3 +345,18 @@ def test_thumbnails_show_what_was_recorded(
 
     qtbot.waitUntil(lambda: drawn("film") > 100)
     qtbot.waitUntil(lambda: drawn("push") > 5)
+
+
+@pytest.mark.parametrize("size", [(1016, 460), (1358, 630), (1912, 940)])
+def test_nothing_of_a_recording_is_cut_off(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path, size: tuple[int, int]
+) -> None:
+    write_force(tmp_path / "push.h5")
+    write_images(tmp_path / "film")
+    panel.resize(*size)
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    qtbot.waitUntil(lambda: panel.viewer.pictures.image is not None)
+    assert panel.size().toTuple() == size
+    assert clipped(panel) == []
+    assert overlapping(panel) == []
