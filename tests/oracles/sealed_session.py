@@ -8,8 +8,15 @@ yields, is weak in places and shears; the instrument has a wrong scale, drifts a
 
 A fibre's true stiffness is the flexural rigidity averaged over its longest span as compliance
 weighs it, one second after a step.
+
+Run as a program it answers requests on standard input, and tells the truth last of all: so
+`cosmic blind-trial` measures in a session that it cannot look into.
 """
 
+import hashlib
+import json
+import secrets
+import sys
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -521,3 +528,85 @@ HARSH = replace(
     jaw_un_um=(200.0, 0.6),
     slip=0.2,
 )
+WORLDS = {each.name: each for each in (FRIENDLY, REALISTIC, HARSH)}
+
+
+class Seal:
+    """A session that answers one request after the other, and keeps its truth until it is opened.
+
+    What is drawn follows from a secret seed; its hash is given away first, so that whoever
+    opens the session later can see that the truth was not chosen afterwards.
+    """
+
+    def __init__(self, world: World, fibres: int, seed: int) -> None:
+        self.seed = seed
+        self.session = Session(world, np.random.default_rng(seed))
+        self.fibres = [Fibre.drawn(self.session) for _ in range(fibres)]
+        self.longest = [0.0] * fibres
+        self.number = -1
+        self.taken: Fibre | None = None
+        self.pushed = 0
+
+    @property
+    def digest(self) -> str:
+        """Hash of the secret that everything follows from."""
+        return hashlib.sha256(str(self.seed).encode()).hexdigest()
+
+    def take(self, number: int, part: float) -> dict:
+        """Hand over what the image shows of a fibre, or of the standard for -1."""
+        self.session.time_s = max(self.session.time_s, 3600.0 * part)
+        self.number, self.pushed = number, 0
+        self.taken = self.fibres[number] if number >= 0 else Fibre.standard(self.session)
+        return {"line_um": self.taken.line(self.taken.shown_deg).tolist()}
+
+    def push(self, place_um: float, stroke_um: float) -> dict:
+        """Hand over what the rig reads of a push of what was taken."""
+        found = pushes(self.session, self.taken, [(place_um, stroke_um)], first=self.pushed)[0]
+        self.pushed += 1
+        if self.number >= 0:
+            self.longest[self.number] = max(self.longest[self.number], place_um)
+        return {
+            "way_um": found.way_um.tolist(),
+            "force_un": found.force_un.tolist(),
+            "force_std_un": found.std_un.tolist(),
+            "time_s": found.time_s.tolist(),
+            "loading": found.loading.tolist(),
+        }
+
+    def opened(self) -> dict:
+        """Tell the truth."""
+        pairs = zip(self.fibres, self.longest, strict=True)
+        return {
+            "seed": str(self.seed),
+            "ei_n_m2": [1e-18 * each.true_ei(span) if span else None for each, span in pairs],
+            "gain": self.session.gain,
+        }
+
+
+def serve() -> None:
+    """Answer requests, a line of JSON each, until the session is opened."""
+    first = json.loads(sys.stdin.readline())
+    seed = first.get("seed")
+    seed = secrets.randbits(128) if seed is None else int(seed)
+    seal = Seal(WORLDS[first["world"]], int(first["fibres"]), seed)
+    answer = {
+        "seal": seal.digest,
+        "standard_ei_n_m2": 1e-18 * STANDARD_EI,
+        "standard_expanded_part": 0.02,
+        "range_un": seal.session.world.range_un,
+    }
+    while True:
+        sys.stdout.write(json.dumps(answer) + "\n")
+        sys.stdout.flush()
+        request = json.loads(sys.stdin.readline())
+        if "take" in request:
+            answer = seal.take(int(request["take"]), float(request["part"]))
+        elif "push" in request:
+            answer = seal.push(*request["push"])
+        else:
+            sys.stdout.write(json.dumps(seal.opened() | {"frozen": request["frozen"]}) + "\n")
+            return
+
+
+if __name__ == "__main__":
+    serve()

@@ -85,6 +85,7 @@ def _parser() -> argparse.ArgumentParser:
     commands.add_parser("daqco", help="the window of DAQCo alone", parents=[window])
     commands.add_parser("vico", help="the window of ViCo alone", parents=[window])
     _add_file_commands(commands)
+    _add_analysis_commands(commands)
     _add_simulate(commands)
     _add_station_commands(commands, platform)
     _add_procedure_commands(commands, platform)
@@ -159,16 +160,6 @@ def _add_file_commands(
     device.add_argument("kind", choices=DEVICE_KINDS, metavar="KIND", help=", ".join(DEVICE_KINDS))
     device.add_argument("name", metavar="NAME", help="what the platform file will say")
     device.add_argument("--out", type=Path, metavar="FOLDER", help="where (default: here)")
-    recompute = commands.add_parser(
-        "recompute", help="compute a campaign's values from its raw files, and say what changed"
-    )
-    recompute.add_argument("folder", type=Path, metavar="FOLDER")
-    recompute.add_argument(
-        "--recipe", type=Path, metavar="RECIPE", help="with the settings of another recipe"
-    )
-    recompute.add_argument(
-        "--apply", action="store_true", help="put the new values into record, report and table"
-    )
     _add_audit(commands)
     _add_session(commands)
     repair = commands.add_parser("repair", help="close recordings that a killed process left open")
@@ -196,6 +187,38 @@ def _add_measure(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
     correct.add_argument("--offscreen", type=float, metavar="SECONDS", help="close by itself")
     correct.add_argument("--screenshot", type=Path, metavar="FILE", help="of the last moment")
+
+
+def _add_analysis_commands(
+    commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
+) -> None:
+    """Add the commands that compute values, and try whether they are true."""
+    trial = commands.add_parser(
+        "blind-trial", help="measure in a sealed world, freeze the analysis, then open the truth"
+    )
+    trial.add_argument(
+        "--world", choices=("friendly", "realistic", "harsh"), default="realistic", help="of which"
+    )
+    trial.add_argument("--fibres", type=int, default=16, help="fibres of a session")
+    trial.add_argument("--sessions", type=int, default=1, help="sessions, each drawn anew")
+    trial.add_argument(
+        "--sealed-by", type=Path, metavar="FILE.py", help="program of sealed sessions of your own"
+    )
+    trial.add_argument(
+        "--whole", type=Path, metavar="RECIPE", help="a whole campaign on the twin, with images"
+    )
+    trial.add_argument("--out", type=Path, metavar="FOLDER", help="of a whole trial")
+    recompute = commands.add_parser(
+        "recompute", help="compute a campaign's values from its raw files, and say what changed"
+    )
+    recompute.add_argument("folder", type=Path, metavar="FOLDER")
+    recompute.add_argument(
+        "--recipe", type=Path, metavar="RECIPE", help="with the settings of another recipe"
+    )
+    recompute.add_argument(
+        "--apply", action="store_true", help="put the new values into record, report and table"
+    )
+    _add_audit(commands)
 
 
 def _add_simulate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

@@ -1,0 +1,105 @@
+"""``cosmic blind-trial``: measure what nobody knows, freeze the analysis, and only then look."""
+
+import argparse
+import hashlib
+import json
+import secrets
+import subprocess
+import sys
+from pathlib import Path
+from typing import Final
+
+from cosmic.app.blind_trial import (
+    Measured,
+    TrialError,
+    TrialResult,
+    TrialRow,
+    digest_of,
+    run_session,
+    sealed_program,
+    table_of,
+)
+from cosmic.autonomy.campaign.analysis import analyse, scale_in
+from cosmic.autonomy.campaign.records import STANDARD, FibreRecord
+from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.twin.truth import TruthRecord, read_truth
+
+FROZEN: Final = "frozen.json"
+SEALED: Final = "sealed"
+SEED_BITS: Final = 48
+MOST_SESSIONS: Final = 1000
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Carry out a blind trial, print its table and return the exit code.
+
+    Raises
+    ------
+    CosmicError
+        A session does not answer, its seal is broken, or the folder holds something already.
+    """
+    if chosen.whole is not None:
+        results = [whole(chosen.whole, chosen.out, chosen.world)]
+    else:
+        program = chosen.sealed_by or sealed_program()
+        results = [
+            run_session(chosen.world, chosen.fibres, program=program)
+            for _ in range(min(chosen.sessions, MOST_SESSIONS))
+        ]
+    sys.stdout.write("\n".join(table_of(results)) + "\n")
+    return 0
+
+
+def whole(recipe: Path, folder: Path | None, world: str) -> TrialResult:
+    """Run a campaign on a twin of a secret seed, freeze its values, and open the truth.
+
+    Raises
+    ------
+    TrialError
+        No folder is named, it is not empty, or the campaign came to nothing.
+    """
+    if folder is None or (folder.exists() and any(folder.iterdir())):
+        raise TrialError("a whole trial needs --out with a folder that is empty, or is not there")
+    seed = secrets.randbits(SEED_BITS)
+    nonce = secrets.token_hex(16)
+    seal = hashlib.sha256(f"{seed} {nonce}".encode()).hexdigest()
+    (folder / SEALED).mkdir(parents=True)
+    sys.stdout.write(f"sealed: {seal}\n")
+    sys.stdout.flush()
+    campaign, truth = folder / "campaign", folder / SEALED / "truth.jsonl"
+    command = [sys.executable, "-m", "cosmic", "campaign", str(recipe), "--out", str(campaign)]
+    command += ["--seed", str(seed), "--world", world, "--truth", str(truth)]
+    with (folder / SEALED / "output.txt").open("wb") as output:  # it names the seed
+        subprocess.run(command, stdout=output, stderr=output, check=False)
+    reader = CampaignReader(campaign)
+    reader.check()
+    analysis = analyse(reader)
+    final = [
+        Measured.of(number, result)
+        for number, result in analysis.results.items()
+        if number not in {each.number for each in reader.fibres(STANDARD)}
+    ]
+    frozen = digest_of(final)
+    (folder / FROZEN).write_text(json.dumps({"seal": seal, "analysis": frozen}), "utf-8")
+    opened = {"seed": seed, "nonce": nonce}
+    (folder / SEALED / "secret.json").write_text(json.dumps(opened), "utf-8")
+    known, records = read_truth(truth), {each.number: each for each in reader.finished()}
+    rows = tuple(
+        TrialRow(each, true)
+        for each in final
+        if (true := true_of(known, records[each.number])) is not None
+    )
+    scale = scale_in(reader.analysis())
+    said = "verified" if scale is not None and scale.verified else "not verified"
+    return TrialResult(seal, frozen, rows, said)
+
+
+def true_of(truth: TruthRecord, record: FibreRecord) -> float | None:
+    """Return what is true of the longest span of a fibre; None: it was not pushed."""
+    pushed = [
+        each.facts
+        for each in truth.of("touched")
+        if record.began_s <= each.time_s <= record.ended_s and "ei_n_m2" in each.facts
+    ]
+    longest = max(pushed, key=lambda each: float(each["abscissa_um"]), default=None)
+    return None if longest is None else float(longest["ei_n_m2"])

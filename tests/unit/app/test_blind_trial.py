@@ -1,0 +1,110 @@
+"""A blind trial: the truth is opened once the analysis is frozen, and not one push earlier."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+
+from cosmic.app.blind_trial import (
+    Measured,
+    SealedSession,
+    TrialError,
+    TrialResult,
+    TrialRow,
+    digest_of,
+    run_session,
+    sealed_program,
+    table_of,
+)
+from cosmic.app.cli import main
+from cosmic.app.commands.blind_trial import true_of
+from cosmic.autonomy.campaign.records import FibreRecord, Outcome
+from cosmic.twin.truth import TruthEvent, TruthRecord
+
+LYING = """
+import json, sys
+sys.stdin.readline()
+answers = [
+    {"seal": "0" * 64, "standard_ei_n_m2": 6e-11, "standard_expanded_part": 0.02, "range_un": 180},
+    {"seed": "1", "ei_n_m2": []},
+]
+for each in answers:
+    print(json.dumps(each), flush=True)
+    sys.stdin.readline()
+"""
+
+
+def measured(number: int, ei: float, half_percent: float, *, trusted: bool = True) -> Measured:
+    half = ei * half_percent / 100.0
+    return Measured(number, ei, ei - half, ei + half, trusted, half_percent)
+
+
+def test_a_session_is_measured_frozen_and_opened() -> None:
+    found = run_session("friendly", 2, secret=5)
+    assert found.seal == hashlib.sha256(b"5").hexdigest()
+    assert found.frozen == digest_of([row.measured for row in found.rows])
+    assert found.scale.startswith("verified")
+    assert [row.measured.number for row in found.rows] == [0, 1]
+    assert all(abs(row.error_percent) < 25.0 for row in found.rows)
+
+
+def test_two_sessions_of_no_secret_in_common_differ() -> None:
+    seals = set()
+    for _ in range(2):
+        with SealedSession(sealed_program(), "friendly", 1) as session:
+            seals.add(session.seal)
+    assert len(seals) == 2
+
+
+def test_a_truth_that_was_chosen_afterwards_is_refused(tmp_path: Path) -> None:
+    program = tmp_path / "lying.py"
+    program.write_text(LYING, encoding="utf-8")
+    session = SealedSession(program, "friendly", 1)
+    with session, pytest.raises(TrialError, match="the seal is broken"):
+        session.open("frozen")
+
+
+def test_a_program_that_does_not_answer_is_named(tmp_path: Path) -> None:
+    program = tmp_path / "silent.py"
+    program.write_text("", encoding="utf-8")
+    with pytest.raises(TrialError, match="does not answer"):
+        SealedSession(program, "friendly", 1)
+
+
+def test_an_analysis_that_is_changed_has_another_hash() -> None:
+    one = [measured(0, 5e-11, 3.0)]
+    assert digest_of(one) != digest_of([measured(0, 5.0001e-11, 3.0)])
+
+
+def test_the_table_counts_what_is_inside_off_by_twice_and_thrown_away() -> None:
+    rows = (
+        TrialRow(measured(0, 5.0e-11, 4.0), 5.1e-11),
+        TrialRow(measured(1, 5.0e-11, 4.0), 5.3e-11),
+        TrialRow(measured(2, 5.0e-11, 4.0), 5.6e-11),
+        TrialRow(measured(3, 5.0e-11, 4.0, trusted=False), 5.1e-11),
+    )
+    text = "\n".join(table_of([TrialResult("s", "f", rows)]))
+    assert "measured 4, good 3" in text
+    assert "interval holds the truth: 1 of 3" in text
+    assert "off by more than twice the half width: 1" in text
+    assert "right and thrown away: 1 of 2" in text
+    assert text.count("OUTSIDE") == 2
+
+
+def test_the_truth_of_a_fibre_is_that_of_its_longest_span() -> None:
+    facts = (
+        (10.0, {"fibre": 4, "abscissa_um": 300.0, "ei_n_m2": 3e-11}),
+        (20.0, {"fibre": 4, "abscissa_um": 600.0, "ei_n_m2": 4e-11}),
+        (90.0, {"fibre": 5, "abscissa_um": 700.0, "ei_n_m2": 9e-11}),
+    )
+    events = tuple(TruthEvent(time_s, "touched", each) for time_s, each in facts)
+    truth = TruthRecord("", 1, (), "plain", events, complete=True)
+    assert true_of(truth, FibreRecord(1, Outcome.GOOD, 5.0, 50.0)) == 4e-11
+    assert true_of(truth, FibreRecord(2, Outcome.GOOD, 55.0, 60.0)) is None
+
+
+def test_a_whole_trial_does_not_run_over_another(tmp_path: Path) -> None:
+    (tmp_path / "something").write_text(json.dumps({}), encoding="utf-8")
+    assert main(["blind-trial", "--whole", "quick", "--out", str(tmp_path)]) == 1
+    assert main(["blind-trial", "--whole", "quick"]) == 1
