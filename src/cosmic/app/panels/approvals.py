@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QTreeWidget, QTreeWidgetItem, QVBoxLayout, QWidget
 
 from cosmic.app.gateways.approvals import Approvals, Asked
@@ -16,7 +17,15 @@ HEADS: Final = ("Program", "Command", "Arguments")
 
 @checked_class
 class ApprovalsPanel(QWidget):
-    """Lists what waits and approves or refuses the chosen one; GUI thread."""
+    """Lists what waits and approves or refuses the chosen one; GUI thread.
+
+    Signals
+    -------
+    asked()
+        A program asks, where nothing waited before.
+    """
+
+    asked = Signal()
 
     def __init__(self, approvals: Approvals, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -58,7 +67,7 @@ class ApprovalsPanel(QWidget):
 
     def _show(self) -> None:
         chosen = self._number()
-        self._asked = self._approvals.waiting
+        before, self._asked = self._asked, self._approvals.waiting
         self._list.clear()
         for each in self._asked:
             item = QTreeWidgetItem([each.who, each.what, each.details])
@@ -66,6 +75,11 @@ class ApprovalsPanel(QWidget):
             self._list.addTopLevelItem(item)
             if each.number == chosen:
                 self._list.setCurrentItem(item)
+        for column in range(len(HEADS) - 1):
+            self._list.resizeColumnToContents(column)
+        if self._asked and not before:
+            self.choose(0)
+            self.asked.emit()
         self._on_chosen()
 
     def _number(self) -> int | None:

@@ -132,7 +132,6 @@ class OperatorWindow(CosmicServerGui):
         if images:
             self.dock(images).raise_()
         self._add_others()
-        self._add_approvals()
         self._lay_out_by_task(settings)
         self._stations = WindowStations(self, platform, host, self._panels_by_application())
         model = self._mico_gui is not None and self._mico_gui.collision.has_model
@@ -142,6 +141,7 @@ class OperatorWindow(CosmicServerGui):
         self._mode = ControlMode(self.top_bar, settings, blocked, self)
         self._mode.changed.connect(self._on_mode_changed)
         self._mode.restore()
+        self._add_approvals()
         self._add_log(ring, console=console)
         # Last, for it sees every event: some ten thousand while the panels are made.
         self._stop_filter = StopKeyFilter(_application(), stop_key, self, moving=self._is_moving)
@@ -205,9 +205,13 @@ class OperatorWindow(CosmicServerGui):
         """Add what programs want to move, where a person has to approve it."""
         host = self._host
         if host is not None and host.asks_first:
-            self._approvals = ApprovalsPanel(host.approvals)
-            self.add_panel(APPROVALS_TITLE, self._approvals)
-            self.closing.connect(self._approvals.end)
+            panel = ApprovalsPanel(host.approvals)
+            self.closing.connect(panel.end)
+            if self._tasks is None:
+                self.add_panel(APPROVALS_TITLE, panel)
+                return
+            self.drawer.add_page(APPROVALS_TITLE, panel, "What other programs want to move")
+            panel.asked.connect(lambda: self.drawer.show_page(APPROVALS_TITLE))
 
     def _add_procedures(self) -> None:
         """Add what moves by itself: trajectories, loops, calibrations, campaigns."""
