@@ -218,7 +218,6 @@ def _add_analysis_commands(
     recompute.add_argument(
         "--apply", action="store_true", help="put the new values into record, report and table"
     )
-    _add_audit(commands)
 
 
 def _add_simulate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
