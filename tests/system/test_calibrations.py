@@ -10,11 +10,10 @@ import pytest
 import cosmic
 from cosmic.app.rig import Rig
 from cosmic.autonomy.calibrating.drift import DRIFT
-from cosmic.autonomy.calibrating.heights import HEIGHTS
 from cosmic.autonomy.calibrating.registry import CalibrationStanding
 from cosmic.autonomy.calibrating.touching import TOUCH
 from cosmic.autonomy.calibrating.zooms import ZOOMS
-from cosmic.autonomy.handling.context import HandlingContext
+from cosmic.autonomy.handling.context import HEIGHTS, HandlingContext
 from cosmic.autonomy.handling.prepare import HELD, PLATE, PROBE, TABLE
 from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
 from cosmic.autonomy.shipped.calibrate import build_calibrate

@@ -11,9 +11,9 @@ from typing import Final
 import pytest
 
 from cosmic.autonomy.calibrating.calibrated import Calibrated
-from cosmic.autonomy.calibrating.heights import HEIGHTS
 from cosmic.autonomy.calibrating.touching import TOUCH, TouchJaw
 from cosmic.autonomy.campaign.campaign import Campaign
+from cosmic.autonomy.handling.context import HEIGHTS
 from cosmic.autonomy.handling.prepare import PLATE
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.operation import UnitOperation

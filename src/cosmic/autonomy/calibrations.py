@@ -8,7 +8,12 @@ from threading import Lock
 from typing import Final
 
 from cosmic.frame.errors import NotAvailable
-from cosmic.vico.core.calibration import Calibration, Plane, RotationCentre
+from cosmic.vico.core.calibration import (
+    SAME_ZOOM_COUNTS,
+    Calibration,
+    Plane,
+    RotationCentre,
+)
 from cosmic.vico.core.calibration_store import load_calibration, save_calibration
 from cosmic.vico.core.pixel_map import Pair, PixelMap
 
@@ -71,11 +76,16 @@ class Calibrations:
         """Put a map in force and keep it; raises `ConfigError` where it cannot be written."""
         self._put(camera, tool, self.get(camera, tool).with_plane(plane))
 
-    def shift(self, camera: str, tool: str, by_um: Pair) -> None:
-        """Move all maps made with a tool, whose tip has moved; raises as `add_plane`."""
+    def shift(self, camera: str, tool: str, by_um: Pair, zoom_counts: float | None = None) -> None:
+        """Move the maps made with a tool, of one zoom or of all; raises as `add_plane`."""
         known = self.get(camera, tool)
         if known.planes and any(by_um):
-            moved = tuple(_moved(each, by_um) for each in known.planes)
+            moved = tuple(
+                _moved(each, by_um)
+                if zoom_counts is None or abs(each.zoom_counts - zoom_counts) <= SAME_ZOOM_COUNTS
+                else each
+                for each in known.planes
+            )
             self._put(camera, tool, replace(known, planes=moved))
 
     def set_rotation(self, camera: str, rotation: RotationCentre) -> None:

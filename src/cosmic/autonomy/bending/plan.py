@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
 from pydantic import Field
 
-from cosmic.autonomy.bending.fit import fit_bending
 from cosmic.autonomy.bending.result import UN_UM2_PER_N_M2, BendingError
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
@@ -15,6 +15,11 @@ from cosmic.frame.config import StrictModel
 
 DRY_EI_N_M2: Final = 5e-11
 """Of a dry fibre, from which to begin when nothing else is known."""
+
+UPPER_PART: Final = 0.4
+"""Of the force of a push: from there on its slope is that of the fibre, not of the first touch."""
+TIMES_NOISE: Final = 5.0
+LEAST_POINTS: Final = 4
 
 LEAST_SPREAD: Final = 1.8
 """Longest over shortest span: spans close together do not tell the clamp from the stiffness."""
@@ -114,11 +119,40 @@ def plan_spans(
 
 
 def guess_ei(spans: Sequence[Span], *, settings: FitSettings | None = None) -> float | None:
-    """Return the stiffness that the spans measured so far speak for, N m2; None: they do not."""
-    if not spans:
+    """Return the stiffness that the spans measured so far speak for, N m2; None: they do not.
+
+    Good to some ten per cent, as plans need it, in less than a millisecond.
+    """
+    settings = settings or FitSettings()
+    found = [ei for each in spans if (ei := _rough_ei(each, settings)) is not None]
+    return math.exp(sum(math.log(each) for each in found) / len(found)) if found else None
+
+
+def _rough_ei(span: Span, settings: FitSettings) -> float | None:
+    """Return what the slope of the upper half of a push says; None: it does not rise."""
+    force = span.force_un[span.loading]
+    if len(force) < LEAST_POINTS:
         return None
-    found = fit_bending(spans, settings=settings).ei_n_m2
-    return found if found > 0.0 else None
+    base, top = float(np.min(force)), float(np.max(force))
+    # Not the dwell: the force falls there at one place.
+    rising = np.arange(len(force)) <= int(np.argmax(force))
+    upper = rising & (force >= base + UPPER_PART * (top - base))
+    upper[max(int(np.argmax(force)) - 1, 0)] = True
+    way, force = span.way_um[span.loading][upper], force[upper]
+    apart = way - way.mean()
+    square = float(apart @ apart)
+    if not square > 0.0:
+        return None
+    slope = float(apart @ force) / square
+    noise = float(np.median(span.force_std_un)) / math.sqrt(square)
+    if not TIMES_NOISE * noise < slope < settings.sensor_un_um:
+        return None
+    k_un_um = 1.0 / (1.0 / slope - 1.0 / settings.sensor_un_um)
+    if span.shape is not None:
+        lever = span.shape.lever_um(settings.offset_um)
+    else:
+        lever = span.nominal_um + settings.offset_um
+    return k_un_um * lever**3 / 3.0 / UN_UM2_PER_N_M2
 
 
 def _spread(shortest: float, longest: float, count: int) -> list[float]:

@@ -9,10 +9,18 @@ from typing_extensions import override
 
 from cosmic.autonomy.calibrating.registry import CalibrationEntry
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext, Measured
-from cosmic.autonomy.handling.prepare import HELD, PLATE, PROBE, see_both, zoom_to
-from cosmic.autonomy.handling.tips import TIMES_STD, Off, TipOff, shift_maps
+from cosmic.autonomy.handling.prepare import (
+    HELD,
+    PLATE,
+    PROBE,
+    beside_jaws,
+    see_both,
+    zoom_to,
+)
+from cosmic.autonomy.handling.tips import TIMES_STD, Off, TipOff, shift_maps, tip_off
 from cosmic.autonomy.procedures.operation import SAFE_POINT, Steps, Yielded
 from cosmic.frame.errors import NotAvailable
+from cosmic.vico.core.image import CameraImage
 
 DRIFT: Final = "drift of the tips"
 
@@ -34,39 +42,61 @@ class CheckDrift(FibreOperation):
             return
         known.drift_looked_at = len(work.shared.finished)
         try:
-            gripper, probe = yield from look_at_both(work)
+            here, gripper, probe = yield from look_at_both(work)
         except NotAvailable:
             mark_unreliable(work)
             return
-        if gripper.certain:
-            follow(work, gripper, probe)
+        if here.certain and gripper.certain:
+            follow(work, gripper, probe, here)
         yield SAFE_POINT
 
 
-def look_at_both(work: HandlingContext) -> Generator[Yielded, object, tuple[TipOff, TipOff]]:
-    """Hold both tips where fibres are pushed, and look at them; raises `NotAvailable`."""
+def look_at_both(
+    work: HandlingContext,
+) -> Generator[Yielded, object, tuple[TipOff, TipOff, TipOff]]:
+    """Hold both tips where fibres are pushed, and look at them; raises `NotAvailable`.
+
+    The gripper is seen before the zoom runs, which moves the image, and both at a higher zoom.
+    """
+    yield from beside_jaws(work)
+    image = yield work.image()
+    assert isinstance(image, CameraImage)
+    here = tip_off(work, image, work.gripper)
     try:
         yield from zoom_to(work, work.settings.calibration.compare_zoom)
-        seen = yield from see_both(work)
+        gripper, probe = yield from see_both(work)
     finally:
         work.shared.zoomed = None
     yield from zoom_to(work, work.settings.zoom)
-    return seen
+    return here, gripper, probe
 
 
-def follow(work: HandlingContext, gripper: TipOff, probe: TipOff) -> None:
-    """Put right what has moved, and note it."""
+def follow(
+    work: HandlingContext, gripper: TipOff, probe: TipOff, here: TipOff | None = None
+) -> None:
+    """Put right what has moved, and note it.
+
+    Parameters
+    ----------
+    here : TipOff or None
+        The gripper as it was seen before the zoom ran to where both were seen; None: it did not.
+    """
     known, settings = work.calibration, work.settings.calibration
-    off = probe.off_um[0] - gripper.off_um[0], probe.off_um[1] - gripper.off_um[1]
+    if here is not None:
+        shift_maps(work, gripper, lens=True)
+        gripper, both = here, gripper
+    else:
+        both = gripper
+    off = probe.off_um[0] - both.off_um[0], probe.off_um[1] - both.off_um[1]
     before = known.seen_off_um
     moved = off[0] - before[0], off[1] - before[1]
     if not all(math.hypot(*each) <= settings.drift_far_um for each in (gripper.off_um, moved)):
         mark_unreliable(work)
         return
     limit_um = max(settings.drift_um, TIMES_STD * gripper.std_um)
-    both_um = max(settings.drift_um, TIMES_STD * math.hypot(gripper.std_um, probe.std_um))
+    both_um = max(settings.drift_um, TIMES_STD * math.hypot(both.std_um, probe.std_um))
     if math.hypot(*gripper.off_um) > limit_um:
-        shift_maps(work, gripper.off_um)
+        shift_maps(work, gripper)
     if math.hypot(*moved) > both_um:
         x, y = known.probe_off_um
         known.probe_off_um = x + moved[0], y + moved[1]

@@ -14,7 +14,7 @@ from cosmic.autonomy.calibrating.focusing import (
     seek_from_below,
 )
 from cosmic.autonomy.calibrating.registry import CalibrationEntry
-from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
+from cosmic.autonomy.handling.context import HEIGHTS, FibreOperation, HandlingContext
 from cosmic.autonomy.handling.prepare import clear_image, retract_probe, zoom_to
 from cosmic.autonomy.procedures.operation import Steps, Yielded
 from cosmic.autonomy.tools import tip_um
@@ -22,7 +22,6 @@ from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.calibration_fit import CalibrationRefused
 from cosmic.vico.core.tool_settings import ToolSettings
 
-HEIGHTS = "heights over the plate"
 LOW_PART = 0.45
 """Of the height at which fibres are held: where the tip is looked at a second time."""
 FIELD_POWER = 1.5

@@ -68,6 +68,9 @@ class CalibrationSettings(StrictModel):
         After so many fibres the tips are looked for again; 0: never.
     drift_um, drift_far_um : float
         What has moved further is followed; what has moved so far is measured anew.
+    lens_far_um : float
+        By how much the image may come to rest elsewhere when the zoom has run; beyond that maps are
+        measured anew.
     tries : int
         How often each is tried; between two tries the table turns, for what lies below may hide
         the tools.
@@ -100,6 +103,7 @@ class CalibrationSettings(StrictModel):
     drift_fibres: int = Field(10, ge=0)
     drift_um: float = Field(1.0, gt=0.0)
     drift_far_um: float = Field(40.0, gt=0.0)
+    lens_far_um: float = Field(150.0, gt=0.0)
     touch: bool = False
     touch_behind_um: float = Field(300.0, gt=50.0)
     touch_below_um: float = 60.0

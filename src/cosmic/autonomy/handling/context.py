@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Final, Protocol
 
 from typing_extensions import override
 
@@ -29,6 +29,8 @@ from cosmic.vico.api.vico import Vico
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats, PixelMap
 from cosmic.vico.core.tool_settings import ToolSettings
+
+HEIGHTS: Final = "heights over the plate"
 
 
 def _never() -> bool:
@@ -55,6 +57,8 @@ class SharedWorkspace:
         Why fibres of the last survey are not taken, and how many.
     finished : list of HeldFibre
         Those that were put away.
+    zoom_runs : int
+        How often the zoom has run: each time the image comes to rest a little elsewhere.
     needs_initialisation : bool
         Positions are not to be believed before the platform was initialised again.
     seen : LastSeen
@@ -76,6 +80,7 @@ class SharedWorkspace:
     unsuitable: list[Candidate] = field(default_factory=list)
     skip_reasons: Counter[str] = field(default_factory=Counter)
     zoomed: float | None = None
+    zoom_runs: int = 0
     surveyed: bool = False
     since_survey: int = 0
     survey_deg: float = 0.0
@@ -120,6 +125,9 @@ class Calibration:
         How many fibres were done with when drift was looked at last.
     touching : bool
         The probe has gone to a jaw, and not come back yet.
+    zoom_run : int
+        Since which run of the zoom the maps of the working zoom are in register; see
+        `SharedWorkspace.zoom_runs`.
     up_um : dict of str to float
         How much higher above the plate the tip of each tool is than its stages say.
     registry : CalibrationRegistry
@@ -132,6 +140,7 @@ class Calibration:
     seen_off_um: tuple[float, float] = (0.0, 0.0)
     drift_looked_at: int = 0
     touching: bool = False
+    zoom_run: int = -1
     up_um: dict[str, float] = field(default_factory=dict)
     registry: CalibrationRegistry = field(default_factory=CalibrationRegistry)
 
@@ -358,10 +367,22 @@ class HandlingContext:
         return self.settings.places.grasp_um + self.stray_um
 
     def learn_height(self, *, held: bool) -> None:
-        """Make grasps a little higher after one that held, and lower after one that missed."""
+        """Make grasps a little higher after one that held, and lower after one that missed.
+
+        Where heights were measured they are never made so low that jaws could press on the plate:
+        when one misses at the lowest, heights are measured anew before the next fibre.
+        """
         positions = self.settings.places
+        lowest = -positions.stray_um
+        if HEIGHTS in self.calibration.made:
+            lowest = max(lowest, positions.lowest_um - positions.grasp_um)
+            if not held and self.stray_um <= lowest:
+                self.calibration.made.pop(HEIGHTS)
+                self.calibration.registry.forget(HEIGHTS, self.settings.gripper)
+                self.stray_um = 0.0
+                return
         stray = self.stray_um + (positions.raise_um if held else -positions.lower_um)
-        self.stray_um = min(max(stray, -positions.stray_um), positions.stray_um)
+        self.stray_um = min(max(stray, lowest), positions.stray_um)
 
     # Looking
 

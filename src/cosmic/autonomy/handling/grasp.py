@@ -1,6 +1,7 @@
 """Taking a fibre up, and what is known of its shape in the jaws."""
 
 import math
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,7 +14,7 @@ from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import along, arc_lengths
 from cosmic.autonomy.handling.reach import LOST, line_of
 from cosmic.autonomy.handling.sight import trace_along
-from cosmic.autonomy.procedures.operation import OperationFailed, Steps
+from cosmic.autonomy.procedures.operation import OperationFailed, Steps, Yielded
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats
 
@@ -173,9 +174,20 @@ class Carry(FibreOperation):
         yield work.go_up(work.hold_tip_um)
         x = positions.hold_x_um * work.jaws.forward
         yield work.go(work.at(work.gripper, x, positions.hold_y_um, work.hold_tip_um))
-        image = yield work.image()
-        assert isinstance(image, CameraImage)
-        fibre.images["held"] = image
-        if not seen_at(work, fibre, image, in_jaws(work, fibre), work.hold_tip_um):
-            fibre.held, work.shared.surveyed = False, False
-            raise OperationFailed(DROPPED, f"fibre {fibre.number} is no longer in the jaws")
+        fibre.images["held"] = yield from see_held(work, fibre)
+
+
+def see_held(work: HandlingContext, fibre: HeldFibre) -> Generator[Yielded, object, CameraImage]:
+    """See that a fibre is still in the jaws, before the probe; return the image.
+
+    Raises
+    ------
+    OperationFailed
+        It is not.
+    """
+    image = yield work.image()
+    assert isinstance(image, CameraImage)
+    if not seen_at(work, fibre, image, in_jaws(work, fibre), work.hold_tip_um):
+        fibre.held, work.shared.surveyed = False, False
+        raise OperationFailed(DROPPED, f"fibre {fibre.number} is no longer in the jaws")
+    return image

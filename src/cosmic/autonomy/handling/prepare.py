@@ -257,6 +257,7 @@ class CalibratePlate(Calibrated):
             work, position.place_x_um, position.place_y_um, position.place_um
         )
         self.kept(work, residual, "px", position.residual_px)
+        work.calibration.zoom_run = work.shared.zoom_runs
 
     @override
     def check(self, work: HandlingContext, entry: CalibrationEntry) -> Holds:
@@ -299,13 +300,50 @@ def still_at(
         return False
     far = math.hypot(*seen.off_um)
     if far <= max(settings.drift_um, TIMES_STD * seen.std_um):
+        work.calibration.zoom_run = work.shared.zoom_runs
         return True
     if not follow:
         return far <= settings.residual_px * seen.scale_um_px
     if not far <= settings.drift_far_um:
         return False
-    shift_maps(work, seen.off_um)
+    shift_maps(work, seen)
+    work.calibration.zoom_run = work.shared.zoom_runs
     return True
+
+
+class Register(FibreOperation):
+    """The tip is looked at once where the zoom has run since the maps were made.
+
+    A motorised zoom comes to rest a little elsewhere each time, and the image with it. Where the
+    tip is far off, or not seen, the maps are measured anew.
+    """
+
+    name = "see where the zoom came to rest"
+
+    @override
+    def steps(self, work: HandlingContext) -> Steps:
+        known, settings = work.calibration, work.settings.calibration
+        if known.zoom_run == work.shared.zoom_runs or work.vico.lens is None:
+            return
+        yield from to_position(work, settings.place_x_um, settings.place_y_um)
+        yield work.go_up(work.hold_tip_um)
+        image = yield work.image()
+        assert isinstance(image, CameraImage)
+        try:
+            seen = tip_off(work, image, work.gripper)
+        except NotAvailable as exc:
+            logger.warning("the tip is not seen after the zoom has run: %s", exc)
+            seen = None
+        if seen is None or not seen.certain or not math.hypot(*seen.off_um) <= settings.lens_far_um:
+            for key in (PLATE, HELD):
+                known.made.pop(key, None)
+                known.registry.forget(key, work.gripper.name)
+            yield from CalibratePlate().steps(work)
+            yield from CalibrateHeld().steps(work)
+            return
+        shift_maps(work, seen, lens=True)
+        known.zoom_run = work.shared.zoom_runs
+        yield SAFE_POINT
 
 
 def to_position(work: HandlingContext, x_um: float, y_um: float) -> Steps:
@@ -440,6 +478,7 @@ def zoom_to(work: HandlingContext, zoom: float) -> Steps:
     lens = work.vico.lens
     if lens is None or work.shared.zoomed == zoom:
         return
+    work.shared.zoom_runs += 1
     yield lens.zoom_to(zoom)
     work.shared.zoomed = zoom
 

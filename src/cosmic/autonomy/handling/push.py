@@ -21,7 +21,7 @@ from cosmic.autonomy.bending.result import BendingError
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
-from cosmic.autonomy.handling.grasp import shape_of
+from cosmic.autonomy.handling.grasp import see_held, shape_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.prepare import retract_probe
 from cosmic.autonomy.handling.retrying_move import RetryingMove
@@ -101,6 +101,10 @@ IN_THE_WAY: Final = "probe in contact"
 UN_UM2: Final = 1e18
 LIMIT_PART: Final = 0.4
 """Of the force limit: what one step of the search may add at most."""
+GUESS_TIMES: Final = 1.6
+"""So much stiffer than guessed a fibre may be at a span."""
+LINE_FROM: Final = 2
+"""Contacts from which the next is foreseen."""
 GROWTH: Final = 1.5
 """How much more than the step before one step may add, when the next is foreseen."""
 
@@ -160,8 +164,12 @@ class OneSpan:
         """Return the way at which the probe should meet the fibre: as it bows, as it was met."""
         if not self._fibre.contacts:
             return self._foreseen_um()
-        # It lies elsewhere than foreseen because of where it is held, or of how it bows: the
-        # probe comes up as if to the nearer of both.
+        # It lies elsewhere than foreseen because of where it is held, or of how it bows. Two
+        # contacts tell both apart; with one the probe comes up as if to the nearer.
+        if len(self._fibre.contacts) >= LINE_FROM:
+            (far, far_off), (near, near_off) = self._fibre.contacts[-LINE_FROM:]
+            slope = (far_off - near_off) / (far - near) if far > near else 0.0
+            return self._foreseen_um() + near_off + slope * (self._plan.span_um - near)
         along, off = self._fibre.contacts[-1]
         return self._foreseen_um() + min(off, off * (self._plan.span_um / along) ** 2)
 
@@ -231,7 +239,7 @@ class OneSpan:
         """Return the largest step at which even the stiffest fibre pushes back little enough."""
         ei = self._push.stiffest_ei_n_m2
         if self._fibre.ei_guess_n_m2 is not None:
-            ei = min(ei, 2.0 * self._fibre.ei_guess_n_m2)
+            ei = min(ei, GUESS_TIMES * self._fibre.ei_guess_n_m2)
         stiffness = 3.0 * ei * UN_UM2 / self._plan.span_um**3
         return min(self._push.search_step_um, LIMIT_PART * self._push.limit_un / stiffness)
 
@@ -243,7 +251,8 @@ class OneSpan:
             before = travel
             travel, mean = yield from self._to(travel + step, push.search_average_s, loading=True)
             if mean.mean_un - base_un > push.contact_un:
-                self._fibre.contacts.append((self._plan.span_um, before - self._foreseen_um()))
+                off = 0.5 * (before + travel) - self._foreseen_um()
+                self._fibre.contacts.append((self._plan.span_um, off))
                 return before
         raise OperationFailed(
             NO_CONTACT,
@@ -455,7 +464,7 @@ def certificate_of(standard: StandardSettings) -> Certificate:
 
 
 class StepBack(FibreOperation):
-    """The probe goes back before the fibre is pushed again.
+    """The probe goes back before the fibre is pushed again, if it is still in the jaws.
 
     One that was not met may point up or down: it is held lower then, and higher the next time.
     """
@@ -470,6 +479,8 @@ class StepBack(FibreOperation):
         x, y = work.tip_now(work.probe)
         back = push.stand_off_um + push.search_um
         yield work.go(work.at(work.probe, x, y - back * (1.0 if work.probe.forward[1] > 0 else -1)))
+        if failure.cause == NO_CONTACT:
+            yield from see_held(work, fibre)
 
 
 class Retract(FibreOperation):

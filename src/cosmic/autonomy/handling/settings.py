@@ -51,6 +51,9 @@ class PositionSettings(StrictModel):
     lower_um, raise_um, stray_um : float
         How true that height is nothing tells but grasps: after one that missed they are made so
         much lower, after one that held so much higher, and never further than `stray_um` from it.
+    lowest_um : float
+        Lowest height of the jaws' edge that is ordered where heights were measured: a touch of the
+        plate stays as small as they are true.
     test_um, test_aside_um : float
         How high and how far aside a grasped fibre is carried to see whether it follows.
     hold_x_um, hold_y_um : float
@@ -73,6 +76,7 @@ class PositionSettings(StrictModel):
     lower_um: float = Field(5.0, ge=0.0)
     raise_um: float = Field(0.8, ge=0.0)
     stray_um: float = Field(18.0, ge=0.0)
+    lowest_um: float = 2.0
     test_um: float = Field(120.0, gt=0.0)
     test_aside_um: float = Field(150.0, gt=0.0)
     hold_x_um: float = 0.0
@@ -190,9 +194,9 @@ class PushSettings(StrictModel):
 
     channel: str = "force"
     stand_off_um: float = Field(40.0, gt=0.0)
-    bow_part: float = Field(0.4, ge=0.0)
+    bow_part: float = Field(0.3, ge=0.0)
     search_um: float = Field(120.0, gt=0.0)
-    search_step_um: float = Field(5.0, gt=0.0)
+    search_step_um: float = Field(8.0, gt=0.0)
     stiffest_ei_n_m2: float = Field(4e-10, gt=0.0)
     contact_un: float = Field(0.6, gt=0.0)
     limit_un: float = Field(110.0, gt=0.0)
@@ -203,8 +207,8 @@ class PushSettings(StrictModel):
     search_average_s: float = Field(0.02, gt=0.0)
     steps_out: int = Field(9, ge=4)
     steps_back: int = Field(6, ge=3)
-    dwell_s: float = Field(1.0, ge=0.0)
-    dwell_looks: int = Field(4, ge=0)
+    dwell_s: float = Field(0.6, ge=0.0)
+    dwell_looks: int = Field(3, ge=0)
     retreat_um: float = Field(12.0, gt=0.0)
     tilt_um: float = Field(55.0, ge=0.0)
     tilt_longest_um: float = Field(330.0, gt=0.0)

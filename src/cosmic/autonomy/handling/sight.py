@@ -229,6 +229,10 @@ def map_at(
 
 
 RESTARTS: Final = 5
+AFTER_FAILURE: Final = 1
+"""Restarts of a camera that was given up at the look before."""
+LOST_WALL_S: Final = 1.0
+"""How long an image is waited for while the camera says why there is none."""
 APART_WALL_S: Final = 1.0
 POLL_WALL_S: Final = 0.002
 APART_PX: Final = 16
@@ -236,9 +240,16 @@ APART_PX: Final = 16
 
 @dataclass(slots=True, eq=False)
 class LastSeen:
-    """The last image that was taken to be new."""
+    """The last image that was taken to be new.
+
+    Attributes
+    ----------
+    given_up : bool
+        None was to be had at the last look.
+    """
 
     image: CameraImage | None = None
+    given_up: bool = False
 
     def shows_the_same(self, image: CameraImage) -> bool:
         """Return whether a later image is the same to the last bit, which noise never allows."""
@@ -270,6 +281,8 @@ class LiveImage:
         self._task: Task | None = None
         self._again_wall_s = 0.0
         self._restarts = 0
+        self._most = AFTER_FAILURE if last.given_up else RESTARTS
+        self._lost_wall_s = WALL.now_s() + LOST_WALL_S
         self._image: CameraImage | None = None
         self._error: CosmicError | None = None
 
@@ -283,6 +296,10 @@ class LiveImage:
             return False
         if self._wanted.done:
             self._take()
+        elif self._camera.problem and WALL.now_s() > self._lost_wall_s:
+            self._begin_anew(
+                NotAvailable(f"no image of {self._camera.name}: {self._camera.problem}")
+            )
         return self._image is not None or self._error is not None
 
     def _take(self) -> None:
@@ -293,6 +310,7 @@ class LiveImage:
             return
         if not self._last.shows_the_same(image):
             self._last.image = self._image = image
+            self._last.given_up = False
             return
         self._begin_anew(
             NotAvailable(
@@ -302,8 +320,8 @@ class LiveImage:
         )
 
     def _begin_anew(self, trouble: CosmicError) -> None:
-        if self._restarts >= RESTARTS:
-            self._error = trouble
+        if self._restarts >= self._most:
+            self._error, self._last.given_up = trouble, True
             return
         self._restarts += 1
         logger.warning("%s: no new image; its stream is restarted", self._camera.name)
@@ -319,6 +337,7 @@ class LiveImage:
         self._task = None
         if not self._steps:
             self._wanted = ImageWanted(self._camera, self._clock)
+            self._lost_wall_s = WALL.now_s() + LOST_WALL_S
         elif WALL.now_s() >= self._again_wall_s:
             self._task = self._steps.pop(0)()
 

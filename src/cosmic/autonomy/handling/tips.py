@@ -34,12 +34,15 @@ class TipOff:
         Of the image.
     certain : bool
         Nothing on the image makes one doubt it, such as a fibre at an edge.
+    zoom_counts : float or None
+        Where the zoom stood; None: not known, or there is none.
     """
 
     off_um: Off
     std_um: float
     scale_um_px: float = 0.0
     certain: bool = True
+    zoom_counts: float | None = None
 
 
 def tip_off(work: HandlingContext, image: CameraImage, tool: ToolSettings) -> TipOff:
@@ -54,19 +57,29 @@ def tip_off(work: HandlingContext, image: CameraImage, tool: ToolSettings) -> Ti
     seen_px = found.hold_px if isinstance(found, GripperTips) else found.tip_px
     x, y = mapped.to_um(seen_px).tolist()
     std_um = math.hypot(found.std_px * mapped.scale_um_px, float(mapped.std_um(seen_px)))
-    return TipOff((x - believed[0], y - believed[1]), std_um, mapped.scale_um_px, found.certain)
+    off_um = x - believed[0], y - believed[1]
+    zoom = image.circumstances.zoom_counts
+    return TipOff(off_um, std_um, mapped.scale_um_px, found.certain, zoom)
 
 
-def shift_maps(work: HandlingContext, off_um: Off) -> None:
-    """Have the maps made by the gripper follow its tip, which is now off by so much.
+def shift_maps(work: HandlingContext, seen: TipOff, *, lens: bool = False) -> None:
+    """Have the maps of one zoom, made by the gripper, follow its tip, which is now off by so much.
 
-    What lies on the plate keeps its position there: the rotation centre goes along.
+    Parameters
+    ----------
+    lens : bool
+        The image has moved, as it does with each run of the zoom. Otherwise the tip has: what lies
+        on the plate keeps its position there, and the rotation centre goes along.
     """
+    off_um = seen.off_um
     positions = work.vision.transform
     if not isinstance(positions, PlatformTransform):
         raise NotAvailable("micromanipulation is not hosted here: there are no maps")
     camera = work.settings.camera or work.vision.first_camera
-    positions.calibrations.shift(camera, work.gripper.name, (-off_um[0], -off_um[1]))
+    by_um = -off_um[0], -off_um[1]
+    positions.calibrations.shift(camera, work.gripper.name, by_um, seen.zoom_counts)
+    if lens:
+        return
     x, y = work.calibration.frame.centre_um
     work.calibration.frame = PlateFrame((x - off_um[0], y - off_um[1]))
 

@@ -50,6 +50,9 @@ from cosmic.autonomy.shipped.calibrate import calibrated
 
 RELEASES = 4
 PUSHES = 3
+"""As level, lower, and higher: a fibre may point up or down."""
+MEASUREMENTS = 2
+"""A grip that gave way may hold the second time; what a model does not fit it fits no better."""
 LOOKS = 2
 
 
@@ -93,10 +96,11 @@ def one_fibre(settings: HandlingSettings, treated: Part[HandlingContext]) -> Par
 
 def measured() -> Part[HandlingContext]:
     """Return the measurement of a fibre that is held before the probe."""
+    pushed = Retry(PushSpans(), PUSHES, only={NO_CONTACT}, between=StepBack())
     return Retry(
-        Sequence[HandlingContext]("measure", PushSpans(), FitSpans()),
-        PUSHES,
-        only={NO_CONTACT, NOT_TRUSTED},
+        Sequence("measure", pushed, FitSpans()),
+        MEASUREMENTS,
+        only={NOT_TRUSTED},
         between=StepBack(),
     )
 

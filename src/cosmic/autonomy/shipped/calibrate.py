@@ -12,6 +12,7 @@ from cosmic.autonomy.handling.prepare import (
     ComparePositions,
     InitialiseAgain,
     MakeReady,
+    Register,
     TurnOn,
     make_safe,
 )
@@ -32,9 +33,11 @@ def calibrated(settings: HandlingSettings) -> tuple[Part[HandlingContext], ...]:
         *((heights,) if chosen.heights else ()),
         *(
             _tried(settings, each)
-            for each in (CalibratePlate(), CalibrateHeld(), ComparePositions())
+            # The maps last: nothing runs the zoom between them and the fibres.
+            for each in (ComparePositions(), CalibratePlate(), CalibrateHeld())
         ),
         *((_tried(settings, TouchJaw()),) if chosen.touch else ()),
+        Register(),
     )
 
 
@@ -50,11 +53,11 @@ def build_calibrate(
     """
     settings = settings or HandlingSettings()
     everything: tuple[FibreOperation, ...] = (
+        ComparePositions(),
+        *((CalibrateZooms(),) if zooms else ()),
         CalibratePlate(),
         CalibrateHeld(),
-        ComparePositions(),
         TouchJaw(),
-        *((CalibrateZooms(),) if zooms else ()),
     )
     root = Sequence(
         "calibrate",
@@ -63,6 +66,7 @@ def build_calibrate(
         MakeReady(),
         Fallback("heights", HeightByFocus(), HeightsAsFiled()),
         *(_tried(settings, each) for each in everything),
+        Register(),
         Survey(),
         FindRotationCentre(),
     )

@@ -20,6 +20,7 @@ from cosmic.autonomy.handling.dual_gripper import (
 from cosmic.autonomy.handling.prepare import (
     InitialiseAgain,
     MakeReady,
+    Register,
     make_safe,
 )
 from cosmic.autonomy.handling.push import Retract, SeeForce
@@ -118,7 +119,7 @@ def prepare(
         *_each(ClearUp()),
         *_each(MakeReady()),
         *_each(Sequence("calibrate", *calibrated(settings), ClearAway())),
-        _as(first, Sequence("look", survey or Survey(), FindRotationCentre())),
+        _as(first, Sequence("look", Register(), survey or Survey(), FindRotationCentre())),
         _as(second, SeeSides(first)),
         _as(first, SeeForce()),
     )

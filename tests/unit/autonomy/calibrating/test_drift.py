@@ -8,11 +8,11 @@ from cosmic.autonomy.calibrating.drift import DRIFT, CheckDrift, follow
 from cosmic.autonomy.calibrating.registry import CalibrationEntry
 from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.coordinate_transform import PlatformTransform
-from cosmic.autonomy.handling.context import Calibration, Measured
+from cosmic.autonomy.handling.context import HEIGHTS, Calibration, HandlingContext, Measured
 from cosmic.autonomy.handling.plate import PlateFrame
 from cosmic.autonomy.handling.prepare import HELD, PLATE, PROBE
 from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.handling.tips import TipOff
+from cosmic.autonomy.handling.tips import TipOff, shift_maps
 from cosmic.frame.clock import ManualClock
 from unit.autonomy.test_calibrations import plane
 
@@ -107,3 +107,56 @@ def test_it_is_looked_at_only_after_so_many_fibres() -> None:
         except (AttributeError, TypeError):
             looked.append(len(work.finished))
     assert looked == [work.settings.calibration.drift_fibres]
+
+
+def test_a_run_of_the_zoom_moves_the_maps_of_that_zoom_and_not_the_plate() -> None:
+    work: Any = Work()
+    calibrations = work.transform.calibrations
+    calibrations.add_plane("top", "left", plane(500.0, 12.0))
+    before = [each.fit.map.centre_um for each in calibrations.get("top", "left").planes]
+    shift_maps(work, TipOff((3.0, -1.0), 0.2, zoom_counts=500.0), lens=True)
+    after = [each.fit.map.centre_um for each in calibrations.get("top", "left").planes]
+    assert after[0] == before[0]
+    assert after[1] == pytest.approx((before[1][0] - 3.0, before[1][1] + 1.0))
+    assert work.calibration.frame.centre_um == (10.0, -5.0)
+
+
+def test_drift_is_told_from_the_image_before_the_zoom_ran() -> None:
+    work: Any = Work()
+    x, y = work.place_um()
+    here = TipOff((2.0, 0.0), 0.2, zoom_counts=0.0)
+    at_zoom = TipOff((30.0, -20.0), 0.2, zoom_counts=500.0)
+    follow(work, at_zoom, TipOff((32.0, -17.0), 0.2, zoom_counts=500.0), here)
+    assert work.place_um() == pytest.approx([x - 2.0, y])
+    assert work.calibration.frame.centre_um == (8.0, -5.0)
+    assert work.calibration.probe_off_um == pytest.approx((2.0, 3.0)), "1 um each further"
+
+
+def context() -> HandlingContext:
+    nothing: Any = None
+    return HandlingContext(
+        mico=nothing,
+        daqco=nothing,
+        vico=nothing,
+        settings=HandlingSettings(),
+        clock=ManualClock(),
+        forces=nothing,
+    )
+
+
+def test_grasps_go_no_lower_than_measured_heights_bear_and_have_them_measured_anew() -> None:
+    work, lowest = context(), HandlingSettings().places.lowest_um
+    work.calibration.made[HEIGHTS] = Measured(0.0, 2.0, "um")
+    heights = []
+    while HEIGHTS in work.calibration.made:
+        work.learn_height(held=False)
+        heights.append(work.grasp_um)
+    assert min(heights) == pytest.approx(lowest)
+    assert work.grasp_um == HandlingSettings().places.grasp_um
+
+
+def test_where_no_height_was_measured_grasps_feel_their_way_down() -> None:
+    work = context()
+    for _ in range(9):
+        work.learn_height(held=False)
+    assert work.grasp_um == pytest.approx(7.0 - HandlingSettings().places.stray_um)

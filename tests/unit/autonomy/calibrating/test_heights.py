@@ -9,9 +9,9 @@ import pytest
 from typing_extensions import override
 
 from cosmic.autonomy.calibrating.calibrated import POOR
-from cosmic.autonomy.calibrating.heights import HEIGHTS, HeightByFocus
+from cosmic.autonomy.calibrating.heights import HeightByFocus
 from cosmic.autonomy.calibrating.registry import CalibrationRegistry, CalibrationStanding
-from cosmic.autonomy.handling.context import HandlingContext
+from cosmic.autonomy.handling.context import HEIGHTS, HandlingContext
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.frame.clock import ManualClock

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cosmic.autonomy.handling import sight
-from cosmic.autonomy.handling.sight import RESTARTS, LastSeen, LiveImage
+from cosmic.autonomy.handling.sight import AFTER_FAILURE, RESTARTS, LastSeen, LiveImage
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.operation import Task
@@ -21,7 +21,10 @@ class FakeCamera:
     """Shows a noisy image each time; frozen, the same one with a new time."""
 
     name = "microscope"
-    problem = ""
+
+    @property
+    def problem(self) -> str:
+        return "it was unplugged" if self.unplugged else ""
 
     def __init__(self, clock: ManualClock) -> None:
         self._clock = clock
@@ -29,6 +32,7 @@ class FakeCamera:
         self.frozen = False
         self.thaws = True
         self.dark = False
+        self.unplugged = False
         self.commands: list[str] = []
         self.listeners: list[Callable[[], object]] = []
         self._data = self._noise()
@@ -37,7 +41,9 @@ class FakeCamera:
         self._count += 1
         return np.random.default_rng(self._count).integers(90, 160, (64, 64), dtype=np.uint8)
 
-    def image_since(self, since_s: float) -> CameraImage:
+    def image_since(self, since_s: float) -> CameraImage | None:
+        if self.unplugged:
+            return None
         if not self.frozen:
             self._data = np.zeros((64, 64), np.uint8) if self.dark else self._noise()
         now_s = self._clock.now_s()
@@ -45,7 +51,7 @@ class FakeCamera:
         frame = Frame(data, 1, now_s, now_s, None, FrameStatus.COMPLETE, PixelFormat.MONO8)
         return CameraImage("microscope", frame, Circumstances())
 
-    def latest(self) -> CameraImage:
+    def latest(self) -> CameraImage | None:
         return self.image_since(0.0)
 
     def on_image(self, listener: Callable[[], object]) -> Callable[[], None]:
@@ -129,6 +135,20 @@ def test_one_that_stays_frozen_is_abandoned_and_says_what_to_look_at(
     with pytest.raises(NotAvailable, match=r"same image again and again.*cable"):
         wanted(camera, clock, last).wait(5.0)
     assert camera.commands == ["stop", "start"] * RESTARTS
+
+
+def test_a_camera_that_was_unplugged_is_given_up_soon_and_at_once_the_next_time(
+    camera: FakeCamera, clock: ManualClock, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(sight, "LOST_WALL_S", 0.0)
+    last, camera.unplugged = LastSeen(), True
+    for restarts in (RESTARTS, RESTARTS + AFTER_FAILURE):
+        with pytest.raises(NotAvailable, match=r"no image of microscope: it was unplugged"):
+            wanted(camera, clock, last).wait(5.0)
+        assert camera.commands == ["stop", "start"] * restarts
+    camera.unplugged = False
+    wanted(camera, clock, last).wait(5.0)
+    assert not last.given_up
 
 
 def test_images_without_any_light_are_not_taken_for_a_frozen_camera(
