@@ -27,6 +27,7 @@ LONG = frozenset(
         "campaign",
         "campaign_faults",
         "campaign_kills",
+        "campaign_worlds",
         "certainty",
         "collision_oracles",
         "full_soak",
