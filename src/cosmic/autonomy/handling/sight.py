@@ -231,6 +231,8 @@ def map_at(
 RESTARTS: Final = 5
 AFTER_FAILURE: Final = 1
 """Restarts of a camera that was given up at the look before."""
+GIVE_UP_WALL_S: Final = 10.0
+"""How long a camera that says why there is no image is started again."""
 LOST_WALL_S: Final = 1.0
 """How long an image is waited for while the camera says why there is none."""
 APART_WALL_S: Final = 1.0
@@ -283,6 +285,7 @@ class LiveImage:
         self._restarts = 0
         self._most = AFTER_FAILURE if last.given_up else RESTARTS
         self._lost_wall_s = WALL.now_s() + LOST_WALL_S
+        self._give_up_wall_s = WALL.now_s() + GIVE_UP_WALL_S
         self._image: CameraImage | None = None
         self._error: CosmicError | None = None
 
@@ -320,7 +323,8 @@ class LiveImage:
         )
 
     def _begin_anew(self, trouble: CosmicError) -> None:
-        if self._restarts >= self._most:
+        lost = bool(self._camera.problem) and WALL.now_s() > self._give_up_wall_s
+        if lost or self._restarts >= self._most:
             self._error, self._last.given_up = trouble, True
             return
         self._restarts += 1

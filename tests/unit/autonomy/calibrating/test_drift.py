@@ -121,7 +121,7 @@ def test_a_run_of_the_zoom_moves_the_maps_of_that_zoom_and_not_the_plate() -> No
     assert work.calibration.frame.centre_um == (10.0, -5.0)
 
 
-def test_drift_is_told_from_the_image_before_the_zoom_ran() -> None:
+def test_drift_is_found_on_the_image_before_the_zoom_ran() -> None:
     work: Any = Work()
     x, y = work.place_um()
     here = TipOff((2.0, 0.0), 0.2, zoom_counts=0.0)
