@@ -1,7 +1,7 @@
 """The one interface of MiCo: ``rig.mico``, its windows, plans and stations use nothing else."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from threading import Lock
 from typing import Final, Literal, Protocol, overload, runtime_checkable
 
@@ -14,6 +14,7 @@ from cosmic.frame.clock import Clock
 from cosmic.frame.declaration import Companion, Declared, command, part, state, stream
 from cosmic.frame.errors import (
     CosmicError,
+    MoveCancelled,
     MoveRefused,
     NotAvailable,
     UnknownAxisError,
@@ -510,6 +511,10 @@ class Mico(Declared):
         MoveRefused, UnknownAxisError
             As `move`.
         """
+        if _halted_since(motions):
+            stopped = GroupMovement.followed(f"the movement of {', '.join(motions)}")
+            stopped.fail(MoveCancelled(f"{', '.join(motions)}: halted before they started"))
+            return stopped
         orders = self._manager.order_together(
             motions,
             source=source_of(source),
@@ -517,8 +522,8 @@ class Mico(Declared):
             linked=linked,
             match_arrival=match_arrival,
         )
-        group, call = GroupMovement.of(orders), current_call()
-        if call is not None and any(call.overtaken(("axes", name)) for name in orders):
+        group = GroupMovement.of(orders)
+        if _halted_since(orders):  # meanwhile, or an axis that is linked to one of them
             group.cancel()
         return group
 
@@ -987,6 +992,12 @@ class Mico(Declared):
         if model is None:
             raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the station's platform file")
         return model
+
+
+def _halted_since(names: Iterable[str]) -> bool:
+    """Return whether the client whose call this is has halted one of the axes since it called."""
+    call = current_call()
+    return call is not None and any(call.overtaken(("axes", name)) for name in names)
 
 
 @runtime_checkable
