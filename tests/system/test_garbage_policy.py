@@ -74,7 +74,7 @@ def test_a_campaign_without_a_window_has_it(
 
 
 def test_a_station_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    def host(_platform: object, _how: object) -> None:
+    def host(*_given: object, **_named: object) -> None:
         assert_in_force()
         raise Seen
 
