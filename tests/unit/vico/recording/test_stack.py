@@ -4,6 +4,7 @@ from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from types import MappingProxyType
 
+import av
 import numpy as np
 import pytest
 import tifffile
@@ -94,3 +95,17 @@ def test_a_snap_says_the_same_by_the_same_names(tmp_path):
     assert (plane["DeltaT"], plane["ExposureTime"], plane["PositionX"]) == (0.0, 0.01, 102.0)
     with tifffile.TiffFile(path) as file:
         assert "left.x_um" in file.ome_metadata
+
+
+@pytest.mark.parametrize("image_format", [ImageFormat.FFV1, ImageFormat.FAST, ImageFormat.SMALL])
+def test_a_video_says_when_it_began_and_how_large_a_pixel_is(tmp_path, image_format):
+    file = ImageFile(tmp_path / "run", image_format, rate_hz=20.0)
+    for number in range(3):
+        shot = image(number)
+        file.append(shot.data, row_of(shot, TAKEN))
+    file.close(complete=True)
+    with av.open(str(file.path)) as video:
+        found = {name.lower(): text for name, text in video.metadata.items()}
+    assert datetime.fromisoformat(found["creation_time"]) == TAKEN
+    assert float(found["pixel_size_um"]) == 0.8
+    assert found["title"] == "cam"

@@ -118,6 +118,7 @@ class VideoWriter:
         found = traits(image_format)
         self._path = path
         self._stamps = TimeStamps()
+        self._described = False
         self._coded = (found.coded or {})[pixel_format]
         self._failure = av.FFmpegError
         try:
@@ -144,6 +145,16 @@ class VideoWriter:
         stream.codec_context.thread_count = threads
         return stream
 
+    def _describe(self, row: SideRow) -> None:
+        """Say when the first image came, of which camera, and its pixel size."""
+        self._described = True
+        scale_um_px = row.circumstances.scale_um_px
+        self._container.metadata["title"] = row.camera
+        if row.utc is not None:
+            self._container.metadata["creation_time"] = row.utc.isoformat(timespec="microseconds")
+        if scale_um_px:
+            self._container.metadata["PIXEL_SIZE_UM"] = repr(scale_um_px)
+
     @property
     def size_bytes(self) -> int:
         """How long the file is."""
@@ -151,6 +162,8 @@ class VideoWriter:
 
     def write(self, data: Pixels, row: SideRow) -> None:
         """Add an image."""
+        if not self._described:
+            self._describe(row)
         frame = to_video_frame(data, self._coded)
         frame.pts = self._stamps.next(row.time_s)
         frame.time_base = TICK
