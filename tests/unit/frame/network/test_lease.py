@@ -109,6 +109,17 @@ def test_a_sign_of_life_from_the_future_or_nowhere_counts_for_nothing(
     assert DeadMan(pulse, 0.3).expired
 
 
+@pytest.mark.parametrize("how", ["taken over", "released"])
+def test_what_moves_by_a_lease_that_is_gone_ends_at_once(lease: StationLease, how: str) -> None:
+    lease.take("vision", "a")
+    remote = lease.dead_man("a")
+    if how == "taken over":
+        lease.take_over()
+    else:
+        lease.release("a")
+    assert remote.expired, "without waiting for silence"
+
+
 def test_what_the_operator_took_over_stays_there_until_offered(lease: StationLease) -> None:
     lease.take("vision", "a")
     lease.take_over()
