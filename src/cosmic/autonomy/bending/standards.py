@@ -177,7 +177,8 @@ def _alone(
     _, alike = _implied(exact, part, settings.model_copy(update=ALIKE))
     refused = "; ".join(doubts)
     if not refused and not abs(off) <= MOST_OFF:
-        refused = f"{100.0 * math.expm1(off):+.0f} % from its certificate: another beam, or a wrong certificate"
+        percent = 100.0 * math.expm1(off)
+        refused = f"{percent:+.0f} % from its certificate: another beam, or a wrong certificate"
     return StandardReading(part, off, std, alike, refused)
 
 
