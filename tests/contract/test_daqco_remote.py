@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import Event
@@ -125,8 +126,15 @@ def _export_something(rig: DaqcoRig) -> None:
 
 
 def _tare(rig: DaqcoRig) -> float:
-    assert wait_until(lambda: rig.daqco.latest_chunk is not None)  # a new scale began anew
-    return rig.daqco.tare("force")
+    found: list[float] = []
+
+    def tared() -> bool:
+        with suppress(NotAvailable):  # a new scale began anew
+            found.append(rig.daqco.tare("force"))
+        return bool(found)
+
+    assert wait_until(tared)
+    return found[0]
 
 
 def _play_something(rig: DaqcoRig) -> float:

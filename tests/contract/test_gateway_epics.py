@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
+from contract.cabinet import Cabinet, WithBell
 from contract.station_rig import free_port, wait_until
-from contract.test_declaration import Cabinet, WithBell
 from cosmic.app.configuration.gateways import EpicsSettings
 from cosmic.app.gateways.epics import EpicsGateway
 from cosmic.frame.failure import Failure, FailurePolicy

@@ -2,6 +2,7 @@
 
 import json
 import socket
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -13,8 +14,8 @@ from PySide6.QtWidgets import QPushButton
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+from contract.cabinet import Cabinet, WithBell
 from contract.station_rig import free_port, wait_until
-from contract.test_declaration import Cabinet, WithBell
 from cosmic.app.configuration.gateways import HttpClient, HttpSettings, doors
 from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.http import BODY_LIMIT_BYTES, HttpGateway
@@ -167,9 +168,10 @@ def test_state_and_streams_are_followed_over_a_websocket(door: Door) -> None:
         seen: dict[str, Any] = {}
         for first in range(100):
             door.home.emit(first, 2)
+            time.sleep(0.05)  # the state comes a moment after the first samples
             word = json.loads(line.recv(5.0))
-            seen[word["topic"]] = word["payload"]
-            if len(seen) == 2:
+            seen.setdefault(word["topic"], word["payload"])
+            if {"cabinet/state", "cabinet/samples"} <= seen.keys():
                 break
         assert seen["cabinet/state"]["settings"]["name"] == "lamp"
         assert seen["cabinet/samples"]["values"] == [0.0, 1.0]

@@ -242,6 +242,11 @@ class Rig:
         from cosmic.autonomy.recorded.steps import RecordedProcedure, load_recorded
 
         if not isinstance(procedure, RecordedProcedure):
+            if not isinstance(procedure, str | Path):
+                raise TypeError(
+                    "procedure must be a recorded procedure or the path of its file, not "
+                    f"{type(procedure).__name__}"
+                )
             procedure = load_recorded(Path(procedure))
         if marked is None and procedure.needs_fibre:
             marked = mark_one(self)

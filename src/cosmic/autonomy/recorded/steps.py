@@ -249,7 +249,7 @@ def load_recorded(path: Path) -> RecordedProcedure:
     """
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as exc:
+    except (OSError, ValueError) as exc:  # ValueError: no text, no TOML, or no path
         raise ConfigError(f"{path}: {exc}") from exc
     return _checked(data, str(path))
 

@@ -1,6 +1,7 @@
 """`Recorder`: begins and ends recordings, and joins to them what belongs in the file."""
 
 import logging
+import math
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -244,6 +245,7 @@ class Recorder:
                     self._put(writer, chunk)
                     writer.add_positions(positions)
                 self._writer = writer
+                self._positions_due_s = -math.inf  # with the first chunk, however short it gets
             for each in self._application.clock_agreement:
                 self.note("clocks", each.text)
         logger.info("recording to %s", writer.path)

@@ -12,6 +12,7 @@ Area = Qt.DockWidgetArea
 _GROUP: Final = "workspaces"
 _LAYOUT: Final = f"{_GROUP}/layout"
 _SHOWN: Final = f"{_GROUP}/shown"
+_PANELS: Final = " panels"
 USUAL: Final = "usual"
 """The layout that a window opens with until another one was named."""
 
@@ -75,6 +76,17 @@ class Workspace:
     middle: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """A workspace as the operator left it: Qt's state, and the panels that have a place in it.
+
+    Qt gives every panel a place that its state does not name, and shows it.
+    """
+
+    state: QByteArray
+    panels: tuple[str, ...]
+
+
 class Workspaces(QObject):
     """Lays the docks of a window out for the task in hand; GUI thread.
 
@@ -102,7 +114,7 @@ class Workspaces(QObject):
         self._settings = settings
         self._known: dict[str, Workspace] = {}
         self._docks: dict[str, QDockWidget] = {}
-        self._states: dict[str, QByteArray] = {}
+        self._states: dict[str, _Kept] = {}
         self._altered = False
         self._laying = False
         self._current = ""
@@ -218,22 +230,26 @@ class Workspaces(QObject):
         self._show(shown)
 
     def _store(self, layout: str) -> None:
-        for name, state in self._states.items():
-            self._settings.setValue(f"{_GROUP}/layouts/{layout}/{name}", state)
+        for name, kept in self._states.items():
+            key = f"{_GROUP}/layouts/{layout}/{name}"
+            self._settings.setValue(key, kept.state)
+            self._settings.setValue(key + _PANELS, "\n".join(kept.panels))
 
     def _load(self) -> None:
         self._states.clear()
         for name in self._known:
-            kept = self._settings.value(f"{_GROUP}/layouts/{self._layout}/{name}")
-            if isinstance(kept, QByteArray) and not kept.isEmpty():
-                self._states[name] = kept
+            key = f"{_GROUP}/layouts/{self._layout}/{name}"
+            state, panels = self._settings.value(key), self._settings.value(key + _PANELS)
+            if isinstance(state, QByteArray) and isinstance(panels, str):
+                self._states[name] = _Kept(state, tuple(panels.split("\n")))
 
     # Laying out
 
     def _keep(self) -> None:
         """Keep the panels as they are, where the operator put them elsewhere."""
         if self._current and (self._altered or self._missing()):
-            self._states[self._current] = self._window.saveState(self._version)
+            panels = tuple(name for name, dock in self._docks.items() if self._is_placed(dock))
+            self._states[self._current] = _Kept(self._window.saveState(self._version), panels)
 
     def _missing(self) -> bool:
         """Tell whether a panel was hidden that has its place here."""
@@ -264,10 +280,12 @@ class Workspaces(QObject):
         middle = window.centralWidget()
         if middle is not None:
             middle.setVisible(workspace.middle)
-        state = self._states.get(name)
+        kept = self._states.get(name)
         # Qt brings a layout back at the size it was kept at, and makes the window as large.
-        self._altered = state is not None and window.restoreState(state, self._version)
-        for dock in docks:
+        self._altered = kept is not None and window.restoreState(kept.state, self._version)
+        for title, dock in self._docks.items():
+            if kept is not None and title not in kept.panels and not dock.isFloating():
+                window.removeDockWidget(dock)
             if not dock.isFloating() and not self._is_placed(dock):
                 dock.hide()
         if not self._altered or not _within(window.minimumSizeHint(), window.size()):
