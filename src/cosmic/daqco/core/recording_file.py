@@ -27,6 +27,8 @@ BLOCK_S: Final = 0.5
 SMALLEST_BLOCK: Final = 256
 LARGEST_BLOCK: Final = 8192
 ROWS_A_CHUNK: Final = 512
+SELDOM: Final = 4
+"""Physical values are made visible at every fourth flush: a whole block is written for each."""
 WRITE_ERRORS: Final = (OSError, RuntimeError, ValueError)
 """What h5py raises when a file cannot be written."""
 
@@ -69,8 +71,8 @@ class RecordingFile:
         self._values = np.zeros_like(self._block)
         self._times = np.zeros(self._block.shape[1])
         self._filled = 0
-        self._scaled = 0
-        self._flushed = 0
+        self._scaled = self._shown = 0
+        self._flushed = self._flushes = 0
         self._columns = 0
         self._next: tuple[int, float] | None = None
         self._scales: tuple[Scale, ...] = ()
@@ -172,8 +174,11 @@ class RecordingFile:
     def flush(self) -> None:
         """Make everything given so far visible to readers, and safe from the end of the process."""
         if self._filled > self._flushed:
-            self._write_block()
+            self._write_volts()
             self._flushed = self._filled
+        self._flushes += 1
+        if self._closing or self._flushes % SELDOM == 0:
+            self._write_values()
         self._take_room()
         self._nexus.flush()
         self._write_tables()
@@ -289,9 +294,10 @@ class RecordingFile:
             )
             self._filled, taken = end, taken + count
             if self._filled == width:
-                self._write_block()
+                self._write_volts()
+                self._write_values()
                 self._columns += width
-                self._filled = self._flushed = self._scaled = 0
+                self._filled = self._flushed = self._scaled = self._shown = 0
 
     def _scale_block(self) -> None:
         """Make values of the volts that came since, by the scales in force."""
@@ -304,13 +310,19 @@ class RecordingFile:
             )
         self._scaled = self._filled
 
-    def _write_block(self) -> None:
+    def _write_volts(self) -> None:
         self._take_room()
-        self._scale_block()
         self._volts.resize(self.samples, axis=1)
         for channel, row in enumerate(self._block):
             self._volts.id.write_direct_chunk((channel, self._columns), row)
-        self._nexus.write(self._columns, self.samples, self._times, self._values)
+
+    def _write_values(self) -> None:
+        """Write what NeXus has of the block."""
+        if self._shown < self._filled:
+            self._take_room()
+            self._scale_block()
+            self._nexus.write(self._columns, self.samples, self._times, self._values)
+            self._shown = self._filled
 
     def _take_room(self) -> None:
         if self._closing:  # what the margin is for

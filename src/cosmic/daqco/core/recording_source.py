@@ -194,6 +194,7 @@ class RecordingSource:
         self.configuration = form.decoded(file["configuration"][()])
         self._volts = file["volts"]
         self._trim()
+        self._check_tables()
 
     def _trim(self) -> None:
         """Leave out what a killed process had not written whole."""
@@ -201,6 +202,17 @@ class RecordingSource:
         whole = chunks[chunks["column"] + chunks["samples"] <= columns]
         self.tables["chunks"] = whole
         self.samples = int(whole["column"][-1] + whole["samples"][-1]) if len(whole) else 0
+
+    def _check_tables(self) -> None:
+        """Raise `ValueError` where rows speak of what is not there: a page of the file is lost."""
+        chunks, scales = self.tables["chunks"], self.tables["scales"]
+        ends = np.concatenate(([0], chunks["column"] + chunks["samples"]))
+        if (chunks["samples"] < 0).any() or (chunks["column"] != ends[:-1]).any():
+            raise ValueError("its chunks do not follow each other")
+        used = set(np.unique(chunks["scale_version"]).tolist())
+        for channel in range(len(self.names)):
+            if used - set(scales["version"][scales["channel"] == channel].tolist()):
+                raise ValueError(f"a scale of {self.names[channel]} is missing")
 
     def _broken(self, exc: Exception) -> RecordingError:
         return RecordingError(
