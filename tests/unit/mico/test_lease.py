@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from cosmic.frame.errors import MoveCancelled
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import Access, Call, Caller, carrying_out
 from cosmic.frame.network.lease import StationLease
@@ -11,10 +12,12 @@ from cosmic.mico.core.collision.checker import NoCollisionModel
 from cosmic.mico.core.motion.checks import Limits, Request
 from cosmic.mico.core.motion.gate import Gate
 from cosmic.mico.core.motion.lease import Guard, Lease
+from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.core.motion.orders import MoveTo
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.core.motion.stop_latch import StopLatch
 from cosmic.mico.hw.interface import Channel, PositionerKind
+from unit.mico.rigs import mico, wait_until
 
 
 @dataclass
@@ -121,3 +124,19 @@ def test_a_hosted_application_knows_its_station() -> None:
     station, application = Station("fibres", FailurePolicy()), Application()
     station.host("stage", application)
     assert application.station is station
+
+
+def test_a_move_ends_as_soon_as_its_guard_has_expired() -> None:
+    guard = ByHand()
+    with mico(instant=False) as (rig, controller):
+        manager = rig.application.manager
+        token = manager.lease.local_token
+        order = Order(0, MoveTo(1000.0, "um"), token, "another program", guard=guard)
+        manager.devices[0].submit(order)
+        wait_until(lambda: bool(controller.of("move_to")))
+        assert not controller.of("stop")
+        guard.why = "nobody has been heard for 300 ms"
+        wait_until(lambda: bool(controller.of("stop")), 5.0)
+        error = order.movement.exception(5.0)
+        assert isinstance(error, MoveCancelled)
+        assert guard.why in str(error)
