@@ -167,10 +167,11 @@ class AlarmWatch:
 
 def processor_load() -> float | None:
     """Return how many programs wait or run, for each core; None where the system does not tell."""
-    if not hasattr(os, "getloadavg"):
+    asked = getattr(os, "getloadavg", None)  # Windows has none
+    if asked is None:
         return None
     with suppress(OSError):
-        return os.getloadavg()[0] / (os.cpu_count() or 1)
+        return float(asked()[0]) / (os.cpu_count() or 1)
     return None
 
 
