@@ -140,7 +140,7 @@ def test_a_calibration_that_is_refused_ends_it_before_a_fibre_is_touched(make: M
     campaign = bench.campaign(more="[parameters.calibration]\nresidual_px = 0.001\ntries = 2")
     campaign.run_here()
     assert campaign.phase is CampaignPhase.FAILED
-    assert "calibration poor: map of the plate: residual" in campaign.end_reason
+    assert "calibration poor: probe against gripper: residual" in campaign.end_reason
     assert "at most 0.001 is allowed" in campaign.end_reason
     assert bench.fibres == ()
     assert bench.truth.of("grasped") == ()

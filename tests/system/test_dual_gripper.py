@@ -54,6 +54,13 @@ def at_probe_s(record: FibreRecord) -> tuple[float, float]:
     return began, ended
 
 
+def ended_with(campaign: Campaign) -> int:
+    """Return how many good fibres ended it; the fit over all of them may call one more good."""
+    number, _, words = campaign.end_reason.partition(" ")
+    assert words == "good fibres"
+    return int(number)
+
+
 def check_good(plate: Bench, good: list[FibreRecord]) -> None:
     """See that what was measured is true, that no fibre counts twice, and nothing was touched."""
     truth: TruthRecord = plate.truth
@@ -71,7 +78,7 @@ def check_good(plate: Bench, good: list[FibreRecord]) -> None:
 def test_both_arms_measure_rightly_and_the_probe_belongs_to_one_at_a_time(plate: Bench) -> None:
     campaign = plate.campaign(plate.recipe(PROCEDURE, good=GOOD), "both")
     campaign.run_here()
-    assert campaign.end_reason == f"{GOOD} good fibres"
+    assert ended_with(campaign) >= GOOD
     found = records(plate, "both")
     good = [each for each in found if each.outcome is Outcome.GOOD]
     check_good(plate, good)
@@ -177,7 +184,7 @@ def test_an_arm_that_fails_gives_its_fibre_up_and_the_other_goes_on(
     campaign = plate.campaign(plate.recipe(PROCEDURE, good=3), f"with {fault}")
     campaign.run_here()
     plate.rig.faults.clear()
-    assert campaign.end_reason == "3 good fibres"
+    assert ended_with(campaign) >= 3
     found = records(plate, f"with {fault}")
     good = [each for each in found if each.outcome is Outcome.GOOD]
     assert {hand_of(plate, each)[0] for each in good} == {"left", "right"}
