@@ -3,10 +3,11 @@
 import argparse
 import logging
 import sys
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event
+from queue import Empty, SimpleQueue
+from typing import Final
 
 from cosmic.app.audit import PlatformAudit, audit_file
 from cosmic.app.configuration.gateways import doors
@@ -21,6 +22,9 @@ from cosmic.frame.log import set_up_logging
 from cosmic.frame.platform_services import ending_signals
 
 logger = logging.getLogger(__name__)
+
+LOOK_S: Final = 1.0
+"""Windows tells of Ctrl+C only between two waits."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +106,9 @@ def serve(options: ServeOptions) -> int:
     opened = doors(file.network.http, file.network.epics, listen=options.http, prefix=options.epics)
     with ExitStack() as at_end:
         at_end.callback(set_up_logging(console=True))
-        ended = Event()
-        at_end.enter_context(ending_signals(lambda name: _end(ended, name)))
+        # A signal may come while its own wait holds what an `Event` needs to be set.
+        ended: SimpleQueue[str] = SimpleQueue()
+        at_end.enter_context(ending_signals(ended.put))
         platform = _build(options, how, options.applications or file.platform.applications)
         at_end.callback(platform.shut_down)
         at_end.callback(install_hooks(platform.policy))
@@ -115,7 +120,7 @@ def serve(options: ServeOptions) -> int:
         at_end.callback(host.close)  # first of all, so that nobody is answered any more
         sys.stdout.write("\n".join((host.address, *host.gateways, "")))
         sys.stdout.flush()
-        ended.wait()
+        _await_end(ended)
     return 0
 
 
@@ -137,6 +142,8 @@ def _build(options: ServeOptions, how: Serving, hosted: tuple[str, ...]) -> Plat
     return platform
 
 
-def _end(ended: Event, name: str) -> None:
-    logger.info("ended by %s", name)
-    ended.set()
+def _await_end(ended: "SimpleQueue[str]") -> None:
+    while True:
+        with suppress(Empty):
+            logger.info("ended by %s", ended.get(timeout=LOOK_S))
+            return
