@@ -129,7 +129,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--core", action="store_true", help="without the extras")
     parser.add_argument("--table", action="store_true", help="print a table for the docs")
-    parser.add_argument("--within", type=float, default=300.0, metavar="SECONDS", help="of each")
+    parser.add_argument("--within", type=float, default=120.0, metavar="SECONDS", help="of each")
     parser.add_argument("places", nargs="*", metavar="PLATFORM:PYTHON")
     chosen = parser.parse_args()
     uv = find_uv()
@@ -141,15 +141,15 @@ def main() -> int:
         parts = {CORE: parts[CORE]}
     places = [tuple(place.split(":", 1)) for place in chosen.places]
     places = places or list(product(PLATFORMS, PYTHONS))
+    pool = ThreadPoolExecutor(AT_ONCE)
     try:
-        with ThreadPoolExecutor(AT_ONCE) as pool:
-            waiting = [
-                pool.submit(resolve_place, uv, parts, place, chosen.within) for place in places
-            ]
-            answers = [answer for each in waiting for answer in each.result()]
+        waiting = [pool.submit(resolve_place, uv, parts, place, chosen.within) for place in places]
+        answers = [answer for each in waiting for answer in each.result()]
     except (NoNetworkError, subprocess.TimeoutExpired) as exc:
         say(f"resolving for other platforms: skipped, no answer ({str(exc)[-200:]})")
         return 0
+    finally:
+        pool.shutdown(cancel_futures=True)  # where one got no answer, none is waited for
     if chosen.table:
         say(table(answers))
     bad = [answer for answer in answers if answer.problem]
