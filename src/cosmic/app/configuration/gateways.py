@@ -57,6 +57,7 @@ class EpicsSettings(StrictModel):
     interface: str = "127.0.0.1"
     port: int = Field(default=0, ge=0, le=65_535)
     write: bool = True
+    step_um: float = Field(default=0.5, gt=0.0, allow_inf_nan=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,6 +67,7 @@ class EpicsGateway:
         self._station = station
         self._hosts = dict(hosts)
         self._prefix = settings.prefix
+        self._step_um = settings.step_um
         self._access = Access.MOVE if settings.write else Access.VIEW
         self._approve = approve
         self._lock = Lock()
@@ -145,7 +146,7 @@ class EpicsGateway:
         for axis, held in values.get("axes", {}).items() if name == "mico" else ():
             state = held["_latest"]
             if isinstance(state, PositionerState) and state.kind is not PositionerKind.OPEN_LOOP:
-                motor = MotorRecord(self._prefix + _plain(axis), axis, state, self)
+                motor = MotorRecord(self._prefix + _plain(axis), axis, state, self, self._step_um)
                 self._motors[axis] = motor
                 yield from motor.channels.items()
         for channel in values["settings"].channel if name == "daqco" else ():

@@ -16,8 +16,6 @@ SETTLED_S: Final = 0.03
 """Between `DMOV` and the end of a put."""
 SMALLEST_STEP: Final = 0.001
 """What `MRES` and the deadband say, in units of the axis."""
-NOMINAL_STEP_UM: Final = 0.5
-"""A guess: about how far one step of a stick-slip stage goes. Only `VELO` is made of it."""
 
 Run = Callable[[Who, str, dict[str, Any], tuple[str, ...]], Awaitable[Any]]
 """`run(who, function, arguments, keys)` carries out a command of MiCo and awaits its end."""
@@ -46,9 +44,18 @@ class MotorRecord:
     ----------
     name : str
         Of the record, such as "COSMIC:left_x".
+    step : float
+        About how far one step goes, in units of the axis; only `VELO` and `VMAX` are made of it.
     """
 
-    def __init__(self, name: str, axis: str, state: PositionerState, commander: Commander) -> None:
+    def __init__(
+        self,
+        name: str,
+        axis: str,
+        state: PositionerState,
+        commander: Commander,
+        step: float,
+    ) -> None:
         self._axis = axis
         self._unit = state.unit
         self._zero = state.zero
@@ -81,8 +88,8 @@ class MotorRecord:
             "DHLM": axis_number(limits[1]),
             "DLLM": axis_number(limits[0]),
             "OFF": axis_number(-state.zero),
-            "VELO": axis_number(NOMINAL_STEP_UM * state.frequency_range_hz[1]),
-            "VMAX": axis_number(NOMINAL_STEP_UM * state.frequency_range_hz[1]),
+            "VELO": axis_number(step * state.frequency_range_hz[1]),
+            "VMAX": axis_number(step * state.frequency_range_hz[1]),
             "EGU": ca.line(units),
             "DESC": ca.line(state.name),
             "DIR": ca.choice(("Pos", "Neg")),

@@ -4,7 +4,6 @@ import asyncio
 import json
 import logging
 import secrets
-import socket
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -13,26 +12,26 @@ from importlib.resources import files
 from itertools import count
 from typing import Any, Final, TypeVar
 
-import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, HTMLResponse, JSONResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
-from typing_extensions import override
 
 from cosmic.app.configuration.gateways import HttpClient, HttpSettings
 from cosmic.app.gateways.catalogue import commands_of
-from cosmic.app.gateways.hub import Hub, Text, Unfollow
+from cosmic.app.gateways.http_server import BEAT_S, BODY_LIMIT_BYTES, HttpServer, listening
+from cosmic.app.gateways.hub import Hub, Unfollow
 from cosmic.app.gateways.image_files import encoded_image, newest_image, shown_jpeg
 from cosmic.app.gateways.mcp import McpTools
 from cosmic.app.gateways.openapi import described
 from cosmic.app.gateways.plain import to_json
 from cosmic.app.gateways.session import Approve, GatewaySession, Order
+from cosmic.app.gateways.websocket_line import WebSocketLine
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.clock import WALL
 from cosmic.frame.declaration import Declared, declaration_of
-from cosmic.frame.errors import CosmicError, MoveRefused, NotAvailable
+from cosmic.frame.errors import CosmicError, MoveRefused
 from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.errors import Busy, CallRefused, RemoteDefect
@@ -41,25 +40,19 @@ from cosmic.frame.network.lease import LeaseState
 from cosmic.frame.network.refusals import RefusalCount
 from cosmic.frame.network.station import Station
 from cosmic.frame.operation import Operation
-from cosmic.frame.threads import WorkerThread
 
 logger = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
-BODY_LIMIT_BYTES: Final = 64 * 1024
 MOST_REQUESTS_S: Final = 200.0
 """So many requests a second of one client are answered; what is more gets 429."""
-MOST_CONNECTIONS: Final = 64
 MOST_WAITING: Final = 32
 """So many commands wait for one application."""
 LONGEST_WAIT_S: Final = 60.0
 FIRST_WORD_S: Final = 3.0
-BEAT_S: Final = 0.2
-PING_S: Final = 0.4
 MOST_OPERATIONS: Final = 256
 SLOWED_AFTER: Final = 20
-_BACKLOG: Final = 256
 
 
 class HttpError(Exception):
@@ -154,8 +147,8 @@ class HttpGateway:
             name: JobQueue(f"{name} over HTTP", station.policy) for name in (*hosts, "", "stops")
         }
         application = self._application()
-        self._socket = _listening(settings)
-        self._server = _Server(application, self._socket, settings, station)
+        self._socket = listening(settings)
+        self._server = HttpServer(application, self._socket, settings, station)
         self._server.start()
 
     @property
@@ -442,7 +435,7 @@ class HttpGateway:
 
     async def _events(self, socket_: WebSocket) -> None:
         await socket_.accept()
-        line = _Line(socket_)
+        line = WebSocketLine(socket_)
         user: _User | None = None
         ends: list[Unfollow] = []
         try:
@@ -480,7 +473,9 @@ class HttpGateway:
         if user.lines == 0:
             user.session.lose_motion(f"{user.settings.name} hung up")
 
-    async def _follow(self, word: Mapping[str, Any], line: "_Line", ends: list[Unfollow]) -> None:
+    async def _follow(
+        self, word: Mapping[str, Any], line: WebSocketLine, ends: list[Unfollow]
+    ) -> None:
         wanted = word.get("follow", [])
         if not isinstance(wanted, list) or len(wanted) > 32 or len(ends) > 64:
             raise HttpError(400, "follow: a list of up to 32 topics")
@@ -494,135 +489,10 @@ class HttpGateway:
                 raise HttpError(400, f"there is no topic {str(topic)[:60]!r}") from None
 
 
-class _Line:
-    """What waits to be sent to one WebSocket: the newest of each topic, or each of a few."""
-
-    def __init__(self, socket_: WebSocket) -> None:
-        self._socket = socket_
-        self._loop = asyncio.get_running_loop()
-        self._woken = asyncio.Event()
-        self._newest: dict[str, Text] = {}
-        self._all: list[Text] = []
-        self._lost = 0
-        self._over = False
-
-    def put(self, topic: str, each: bool, text: Text) -> None:
-        """Have it sent; any thread, returns at once."""
-        with suppress(RuntimeError):  # the loop has ended
-            self._loop.call_soon_threadsafe(self._put, topic, each, text)
-
-    def _put(self, topic: str, each: bool, text: Text) -> None:
-        if not each:
-            self._newest[topic] = text
-        elif len(self._all) < _BACKLOG:
-            self._all.append(text)
-        else:
-            self._lost += 1
-        self._woken.set()
-
-    def end(self) -> None:
-        """Let `run` end: a cancellation alone can be lost in `wait_for` before Python 3.12."""
-        self._over = True
-        self._woken.set()
-
-    async def run(self, beat: Callable[[], None]) -> None:
-        """Send what comes, until cancelled; `beat` is called while the line stands."""
-        while not self._over:
-            with suppress(TimeoutError):
-                await asyncio.wait_for(self._woken.wait(), BEAT_S)
-            beat()
-            self._woken.clear()
-            waiting, self._all = self._all, []
-            newest, self._newest = self._newest, {}
-            if self._lost:
-                waiting.append(json.dumps({"topic": "lost", "payload": self._lost}))
-                self._lost = 0
-            for text in (*waiting, *newest.values()):
-                await self.send(text)
-
-    async def send(self, text: Text) -> None:
-        """Send one message."""
-        if isinstance(text, bytes):
-            await self._socket.send_bytes(text)
-        else:
-            await self._socket.send_text(text)
-
-
-class _Server(WorkerThread):
-    def __init__(
-        self, application: Starlette, bound: socket.socket, settings: HttpSettings, station: Station
-    ) -> None:
-        super().__init__(f"{station.name} over HTTP", station.policy)
-        self._bound = bound
-        self._lease = station.lease
-        self._server = uvicorn.Server(
-            uvicorn.Config(
-                application,
-                log_config=None,
-                access_log=False,
-                lifespan="off",
-                http="h11",
-                ws="websockets-sansio",
-                ws_max_size=BODY_LIMIT_BYTES,
-                ws_ping_interval=PING_S,
-                ws_ping_timeout=PING_S,
-                limit_concurrency=MOST_CONNECTIONS,
-                timeout_keep_alive=5,
-                timeout_graceful_shutdown=1,
-                h11_max_incomplete_event_size=16 * 1024,
-                server_header=False,
-                ssl_certfile=settings.certificate or None,
-                ssl_keyfile=settings.key or None,
-            )
-        )
-
-    @override
-    def run_body(self) -> None:
-        asyncio.run(self._serve())
-
-    async def _serve(self) -> None:
-        watching = asyncio.create_task(self._watch())
-        try:
-            await self._server.serve(sockets=[self._bound])
-        finally:
-            watching.cancel()
-
-    async def _watch(self) -> None:
-        """Let the right to move lapse of whoever fell silent."""
-        while True:
-            await asyncio.sleep(BEAT_S)
-            self._lease.poll()
-
-    @override
-    def request_end(self) -> None:
-        super().request_end()
-        self._server.should_exit = True
-
-
 _POLICY: Final = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "connect-src 'self' ws: wss:; frame-ancestors 'none'"
 )
-
-
-def _listening(settings: HttpSettings) -> socket.socket:
-    host, port = settings.where
-    try:
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        made = socket.socket(family, socket.SOCK_STREAM)
-        try:
-            made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            made.bind((host, port))
-            made.listen(MOST_CONNECTIONS)  # from now on who comes is answered, if a little later
-        except OSError:
-            made.close()
-            raise
-    except OSError as exc:
-        raise NotAvailable(
-            f"HTTP cannot listen at {settings.listen}: {exc.strerror or exc}; choose another "
-            "address with --http"
-        ) from exc
-    return made
 
 
 def _part(kind: type[Declared], name: str) -> tuple[type[Declared], bool]:

@@ -1,0 +1,99 @@
+"""The thread in which HTTP is served, and where it listens."""
+
+import asyncio
+import socket
+from typing import Final
+
+import uvicorn
+from starlette.applications import Starlette
+from typing_extensions import override
+
+from cosmic.app.configuration.gateways import HttpSettings
+from cosmic.frame.errors import NotAvailable
+from cosmic.frame.network.station import Station
+from cosmic.frame.threads import WorkerThread
+
+BODY_LIMIT_BYTES: Final = 64 * 1024
+MOST_CONNECTIONS: Final = 64
+BEAT_S: Final = 0.2
+PING_S: Final = 0.4
+
+
+class HttpServer(WorkerThread):
+    """Serves an application in a loop of its own, and ends the right to move of the silent."""
+
+    def __init__(
+        self, application: Starlette, bound: socket.socket, settings: HttpSettings, station: Station
+    ) -> None:
+        super().__init__(f"{station.name} over HTTP", station.policy)
+        self._bound = bound
+        self._lease = station.lease
+        self._server = uvicorn.Server(
+            uvicorn.Config(
+                application,
+                log_config=None,
+                access_log=False,
+                lifespan="off",
+                http="h11",
+                ws="websockets-sansio",
+                ws_max_size=BODY_LIMIT_BYTES,
+                ws_ping_interval=PING_S,
+                ws_ping_timeout=PING_S,
+                limit_concurrency=MOST_CONNECTIONS,
+                timeout_keep_alive=5,
+                timeout_graceful_shutdown=1,
+                h11_max_incomplete_event_size=16 * 1024,
+                server_header=False,
+                ssl_certfile=settings.certificate or None,
+                ssl_keyfile=settings.key or None,
+            )
+        )
+
+    @override
+    def run_body(self) -> None:
+        asyncio.run(self._serve())
+
+    async def _serve(self) -> None:
+        watching = asyncio.create_task(self._watch())
+        try:
+            await self._server.serve(sockets=[self._bound])
+        finally:
+            watching.cancel()
+
+    async def _watch(self) -> None:
+        """Let the right to move lapse of whoever fell silent."""
+        while True:
+            await asyncio.sleep(BEAT_S)
+            self._lease.poll()
+
+    @override
+    def request_end(self) -> None:
+        super().request_end()
+        self._server.should_exit = True
+
+
+def listening(settings: HttpSettings) -> socket.socket:
+    """Return a socket that listens where the settings say.
+
+    Raises
+    ------
+    NotAvailable
+        Somebody else listens there, or it is no address of this computer.
+    """
+    host, port = settings.where
+    try:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        made = socket.socket(family, socket.SOCK_STREAM)
+        try:
+            made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            made.bind((host, port))
+            made.listen(MOST_CONNECTIONS)  # from now on who comes is answered, if a little later
+        except OSError:
+            made.close()
+            raise
+    except OSError as exc:
+        raise NotAvailable(
+            f"HTTP cannot listen at {settings.listen}: {exc.strerror or exc}; choose another "
+            "address with --http"
+        ) from exc
+    return made
