@@ -230,3 +230,15 @@ def test_what_came_before_the_click_is_recorded_too(rig: cosmic.Rig, tmp_path: P
     daqco.stop_recording()
     with cosmic.open_recording(tmp_path / "usual.h5") as recording:
         assert recording.time_s[0] > begun_s - 0.2
+
+
+def test_the_shortest_recording_says_where_the_axes_were(rig: cosmic.Rig, tmp_path: Path) -> None:
+    for number in range(8):
+        file = tmp_path / f"{number}.h5"
+        with rig.daqco.record(file):
+            begun = rig.daqco.counters.samples
+            wait_until(lambda least=begun: rig.daqco.counters.samples > least)
+        with cosmic.open_recording(file) as recording:
+            times, where, _ = recording.positions("probe.y")
+            assert len(times) > 0
+            assert np.isfinite(where).all()

@@ -127,3 +127,18 @@ def test_a_recording_of_before_still_opens(tmp_path: Path, recording):
                 target.attrs[name] = value
     with open_recording(old) as found:
         np.testing.assert_array_equal(found.values("force"), FORCE.apply(recording[1][1]))
+
+
+@pytest.mark.parametrize("flushes", range(4))
+def test_a_closed_recording_has_all_its_values_however_often_it_was_flushed(tmp_path, flushes):
+    head, volts = header(), volts_of(2, 700)
+    file = RecordingFile(tmp_path / "short.h5", head)
+    for chunk in chunks(head, volts, 50):
+        file.append(chunk)
+    for _ in range(flushes):
+        file.flush()
+    file.close(complete=True)
+    with h5py.File(tmp_path / "short.h5") as found:
+        force = head.names.index("force")
+        np.testing.assert_array_equal(found["entry/data/force"][:], FORCE.apply(volts[force]))
+        assert len(found["entry/data/time"]) == 700
