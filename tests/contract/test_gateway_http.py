@@ -192,6 +192,16 @@ def test_a_client_that_is_gone_leaves_nothing_moving(door: Door) -> None:
         assert door.station.lease.state.local
 
 
+def test_who_takes_over_ends_what_goes_on_for_a_client(door: Door) -> None:
+    with door.client() as http, door.line():
+        http.post("/api/control")
+        http.post("/api/cabinet/travel")
+        assert wait_until(lambda: bool(door.home.tasks))
+        door.station.lease.take_over()
+        assert wait_until(lambda: door.home.tasks[0].done, 1.0)
+        assert door.home.tasks[0].failure is not None
+
+
 def test_a_client_that_falls_silent_loses_the_right_to_move(door: Door) -> None:
     with door.client() as http:
         http.post("/api/control")
