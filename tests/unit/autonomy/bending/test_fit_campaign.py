@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 
-from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.bending.fit import (
     Certificate,
     MeasuredFibre,
@@ -15,14 +14,12 @@ from cosmic.autonomy.bending.fit import (
     half_width_percent,
     measure_fibre,
 )
-from cosmic.autonomy.bending.plan import plan_spans
 from cosmic.autonomy.bending.result import Kind, Quality
 from cosmic.autonomy.bending.settings import FitSettings
-from cosmic.autonomy.bending.span import Span
 from oracles.pushed_rod import pushed
-from oracles.sealed_session import STANDARD_EI, Fibre, Session, World, curves, pushes
+from oracles.sealed_session import STANDARD_EI, Fibre, Session, World, curves
+from unit.autonomy.bending.sealed_fibres import SCALE, spans_of
 
-SCALE = 1e-18
 WORLD = World(
     noise_un=0.03,
     friction=(0.25, 0.25),
@@ -32,26 +29,6 @@ WORLD = World(
     relaxation=(0.01, 0.0),
 )
 CERTIFICATE = Certificate(STANDARD_EI * SCALE, 0.02)
-
-
-def spans_of(session: Session, fibre: Fibre, *, shown_deg: float = 0.0) -> list[Span]:
-    """Return what a procedure would measure of a fibre."""
-    plan = plan_spans(min(fibre.free_um, 900.0), fibre.ei * SCALE)
-    line = fibre.line(shown_deg)
-    return [
-        Span(
-            nominal_um=each.place_um,
-            probe_x_um=each.place_um,
-            hold_x_um=0.0,
-            way_um=each.way_um,
-            force_un=each.force_un,
-            force_std_un=each.std_un,
-            time_s=each.time_s,
-            loading=each.loading,
-            shape=NaturalShape(line[:, 0], line[:, 1], each.place_um),
-        )
-        for each in pushes(session, fibre, [(one.span_um, one.stroke_um) for one in plan])
-    ]
 
 
 def measured(

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.bending.fit import (
     Certificate,
     MeasuredFibre,
@@ -14,13 +13,11 @@ from cosmic.autonomy.bending.fit import (
     in_time,
     measure_fibre,
 )
-from cosmic.autonomy.bending.plan import plan_spans
 from cosmic.autonomy.bending.settings import FitSettings
-from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.bending.standards import ForceScale
-from oracles.sealed_session import STANDARD_EI, Fibre, Session, World, pushes
+from oracles.sealed_session import STANDARD_EI, Fibre, Session, World
+from unit.autonomy.bending.sealed_fibres import SCALE, spans_of
 
-SCALE = 1e-18
 SETTINGS = FitSettings()
 CERTIFICATE = Certificate(STANDARD_EI * SCALE, 0.02)
 WORLD = World(
@@ -35,23 +32,7 @@ WORLD = World(
 def measured(
     session: Session, beam: Fibre, certificate: Certificate | None = None
 ) -> MeasuredFibre:
-    plan = plan_spans(min(beam.free_um, 900.0), beam.ei * SCALE)
-    line = beam.line()
-    spans = [
-        Span(
-            nominal_um=each.place_um,
-            probe_x_um=each.place_um,
-            hold_x_um=0.0,
-            way_um=each.way_um,
-            force_un=each.force_un,
-            force_std_un=each.std_un,
-            time_s=each.time_s,
-            loading=each.loading,
-            shape=NaturalShape(line[:, 0], line[:, 1], each.place_um),
-        )
-        for each in pushes(session, beam, [(one.span_um, one.stroke_um) for one in plan])
-    ]
-    return measure_fibre(spans, settings=SETTINGS, certificate=certificate)
+    return measure_fibre(spans_of(session, beam), settings=SETTINGS, certificate=certificate)
 
 
 def scale_of(*gains: float, certificate: Certificate = CERTIFICATE, seed: int = 5) -> ForceScale:
