@@ -406,6 +406,7 @@ class Campaign:
     def _treat_one(self) -> str:
         """Treat one fibre; returns why the campaign ends, or nothing."""
         taken = len(self.work.shared.finished)
+        self.work.shared.seeking.clear()
         failure = self._carry_through(self._treatment.procedure)
         if isinstance(failure, OperationFailed):
             return self._after_failure(failure, taken)
@@ -546,7 +547,8 @@ class Campaign:
 
     def _enough(self) -> bool:
         """Tell whether no further fibre is to be begun, if those in work become good ones."""
-        now, more = self.progress, len(self._recorder.in_work)
+        arms = {each.arm for each in self._recorder.in_work} | self.work.shared.seeking
+        now, more = self.progress, len(arms)
         if self._standards.due(self._share, ending=False):
             return True
         then = replace(now, done=now.done + more, good=now.good + more)

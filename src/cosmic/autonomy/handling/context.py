@@ -68,6 +68,8 @@ class SharedWorkspace:
         arms work, each is used by one at a time.
     arms : dict of str to HandlingContext
         Where several work, each by its gripper's name.
+    seeking : set of str
+        Grippers that have begun with a fibre, whether they have chosen it yet or not.
     enough : callable
         Says whether no further fibre is to be begun, for a procedure that treats many.
     """
@@ -91,7 +93,13 @@ class SharedWorkspace:
     plate: Resource = field(default_factory=lambda: Resource("the plate", 0))
     probe: Resource = field(default_factory=lambda: Resource("the probe", 1))
     arms: "dict[str, HandlingContext]" = field(default_factory=dict)
+    seeking: set[str] = field(default_factory=set)
     enough: Callable[[], bool] = _never
+
+    def done_with(self, fibre: HeldFibre) -> None:
+        """Note that a fibre is done with, and its arm free for another."""
+        self.finished.append(fibre)
+        self.seeking.discard(fibre.arm)
 
 
 @dataclass(frozen=True, slots=True)

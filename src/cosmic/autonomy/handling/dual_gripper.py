@@ -45,12 +45,16 @@ def hidden(work: HandlingContext, approach: Reach) -> bool:
 def over(work: HandlingContext) -> bool:
     """Return whether an arm begins no further fibre in this round."""
     shared, again = work.shared, work.settings.re_survey
+    shared.seeking.discard(work.settings.gripper)
     if shared.enough() or not shared.surveyed or stands_aside(work):
         return True
     if again and shared.since_survey >= again:
         return True
     angle = work.table_deg
-    return not any(approaches_of(work, each, angle) for each in work.shared.candidates)
+    if not any(approaches_of(work, each, angle) for each in work.shared.candidates):
+        return True
+    shared.seeking.add(work.settings.gripper)
+    return False
 
 
 def stands_aside(work: HandlingContext) -> bool:

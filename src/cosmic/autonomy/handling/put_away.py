@@ -137,7 +137,7 @@ class Finish(FibreOperation):
     def steps(self, work: HandlingContext) -> Steps:
         fibre = work.held_fibre()
         fibre.done_s, fibre.put_away = work.clock.now_s(), True
-        work.shared.finished.append(fibre)
+        work.shared.done_with(fibre)
         work.fibre = None
         yield SAFE_POINT
 
@@ -165,7 +165,7 @@ class GiveUp(FibreOperation):
     def steps(self, work: HandlingContext) -> Steps:
         fibre = work.held_fibre()
         fibre.done_s = work.clock.now_s()
-        work.shared.finished.append(fibre)
+        work.shared.done_with(fibre)
         if not fibre.put_away and fibre.tries:
             work.shared.surveyed = False
         work.shared.skipped.append(fibre.reach.candidate)
@@ -190,5 +190,5 @@ class ClearUp(FibreOperation):
         yield from Release().steps(work)
         fibre.failure = fibre.failure or OperationFailed(INTERRUPTED, "the run before was ended")
         fibre.done_s = work.clock.now_s()
-        work.shared.finished.append(fibre)
+        work.shared.done_with(fibre)
         work.fibre = None

@@ -114,6 +114,6 @@ class LeaveStandard(FibreOperation):
         fibre = work.held_fibre()
         fibre.done_s, fibre.put_away = work.clock.now_s(), not fibre.held
         fibre.failure = fibre.failure if fibre.put_away else OperationFailed(ADHESION, "standard")
-        work.shared.finished.append(fibre)
+        work.shared.done_with(fibre)
         work.fibre, work.shared.surveyed = None, False
         yield SAFE_POINT

@@ -179,6 +179,7 @@ class Recorder:
         self._software, self._configuration = software, configuration
         self._lock = RLock()
         self._writer: UDaqFileWriter | None = None
+        self._closing: UDaqFileWriter | None = None
         self._before = SamplesBefore()
         self._handing_over = Lock()
         self._stats: RecordingStats | None = None
@@ -198,8 +199,8 @@ class Recorder:
 
     @property
     def state(self) -> RecordingState:
-        """How the recording stands."""
-        writer, stats = self._writer, self._stats
+        """How the recording stands; it is active until its file is closed."""
+        writer, stats = self._writer or self._closing, self._stats
         return RecordingState(
             active=writer is not None and writer.isRunning() and writer.error is None,
             path=writer.path if writer is not None else stats.path if stats else None,
@@ -258,7 +259,8 @@ class Recorder:
 
     def _close(self) -> None:
         with self._lock:
-            writer, self._writer = self._writer, None
+            self._closing = writer = self._writer
+            self._writer = None
             if writer is None:
                 return
             writer.request_end()
@@ -268,6 +270,7 @@ class Recorder:
                 self._failure = f"{writer.path}: the disk does not answer; it is still being closed"
                 logger.error("%s", self._failure)
             self._forget(writer.path)
+            self._closing = None
             duration_s = self._stats.duration_s if self._stats else 0.0
             logger.info("recorded %.1f s to %s", duration_s, writer.path)
         self._changed.emit()
