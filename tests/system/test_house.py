@@ -1,17 +1,23 @@
 """What holds for the whole repository: quiet imports, honest documents, running examples."""
 
+import ast
 import json
 import os
 import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
+from importlib import metadata
 from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QObject, Signal
+
+from system.docs_blocks import blocks
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "src"
@@ -167,6 +173,57 @@ def test_constraints_are_exact_versions_and_nothing_else() -> None:
     assert [
         pin for pin in pins if not re.fullmatch(r"[A-Za-z0-9_.-]+==[0-9][0-9A-Za-z.]*", pin)
     ] == []
+
+
+def _imported(text: str) -> set[str]:
+    """Return the packages that a program imports, wherever in it."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            found |= {each.name.partition(".")[0] for each in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            found.add(node.module.partition(".")[0])
+    return found - sys.stdlib_module_names - {each.name for each in (ROOT / "tests").iterdir()}
+
+
+def _whole(program: str) -> bool:
+    with suppress(SyntaxError):
+        ast.parse(program)
+        return True
+    return False
+
+
+def _plain(requirement: str) -> str:
+    found = re.match(r"[A-Za-z0-9_.-]+", requirement)
+    assert found, requirement
+    return re.sub(r"[-_.]+", "-", found[0]).lower()
+
+
+def test_what_tests_and_tutorials_import_is_installed_with_them() -> None:
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    project = tomllib.loads(text)["project"]
+    groups = (project["dependencies"], *project["optional-dependencies"].values())
+    declared = {_plain(each) for group in groups for each in group}
+    brought = set(declared)
+    for each in declared:
+        with suppress(metadata.PackageNotFoundError):
+            needed = [one for one in metadata.requires(each) or [] if "extra ==" not in one]
+            brought |= {_plain(one) for one in needed}
+    files = {each: each.read_text(encoding="utf-8") for each in (ROOT / "tests").rglob("*.py")}
+    for page in DOCUMENTS:
+        files[page] = "\n".join(
+            each.text for each in blocks(page) if each.language == "python" and _whole(each.text)
+        )
+    there = metadata.packages_distributions()
+    missing = {
+        (str(file.relative_to(ROOT)), name)
+        for file, program in files.items()
+        for name in _imported(program)
+        if not (ROOT / name).exists()
+        and there.get(name)
+        and not {_plain(each) for each in there[name]} & brought
+    }
+    assert missing == set(), "name it in the extra `dev` of pyproject.toml"
 
 
 # --- documents --------------------------------------------------------------------------------
