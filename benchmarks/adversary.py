@@ -203,7 +203,8 @@ def figures(result: Result) -> list[Figure]:
         Figure(NAME, "pairs nearer than their margin", len(found.too_near), "", 0),
         Figure(NAME, "movements after a stop", len(found.late_stops), "", 0),
         Figure(NAME, "axes outside their soft limits", len(found.outside), "", 0),
-        Figure(NAME, "axes that the oracle lost sight of", len(found.unseen), "", 0),
+        Figure(NAME, "movements that the oracle looked at anew", found.late_plans, ""),
+        Figure(NAME, "farthest that the oracle was behind", found.behind_s, "s"),
         Figure(NAME, "raw errors", len(result.raw), "", 0),
         Figure(NAME, "least that a pair had to spare", least, "um"),
     ]

@@ -19,6 +19,8 @@ NONSENSE: Final[Sequence[Any]] = (
 )  # fmt: skip
 SWEPT: Final = ("probe.y", "table.rotation")
 """The only axes that are calibrated, referenced and driven to their end stops."""
+SWEEPS: Final = (Calibrate(), Reference())
+"""What leads over the whole travel, beyond the soft limits too."""
 
 
 class Attack:
@@ -218,6 +220,8 @@ class OrderAttack(Attack):
         self._rig = rig
         self._axes = list(rig.mico)
         self._seen: list[Order] = []
+        places = [rig.mico[name].details.address for name in SWEPT]
+        self._swept = {(place.device, place.channel) for place in places}
         for axis in self._axes:
             device = rig.mico.application.manager.device(axis.name)
             device.submit = self._remembering(device.submit)
@@ -232,6 +236,12 @@ class OrderAttack(Attack):
 
     def _submit(self, order: Order) -> None:
         axis = self.chance.choice(self._axes)
+        device = axis.details.address.device
+        rightful = order.reservation is None
+        if rightful and order.motion in SWEEPS and (device, order.channel) not in self._swept:
+            # With the holder's token this is no attack, but a run over the whole travel, which
+            # the gate allows where it is clear, and which leads beyond the soft limits.
+            order = order._replace(token="mine")
         self._rig.mico.application.manager.device(axis.name).submit(order)
 
     def _epoch(self) -> int:
@@ -248,8 +258,7 @@ class OrderAttack(Attack):
                 MoveTo(self.chance.uniform(-7000.0, 7000.0), "um"),  # type: ignore[arg-type]
                 MoveBy(self.chance.uniform(-7000.0, 7000.0), "um"),  # type: ignore[arg-type]
                 Step(self.chance.choice((-29999, 29999)), 100.0, 18500),
-                Calibrate(),
-                Reference(),
+                *SWEEPS,
             )
         )
         names = self._rig.mico.names

@@ -3,6 +3,7 @@
 Knows the twin's truth and the platform's files; nothing of the gate, the device or the stop.
 """
 
+import math
 import pickle
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from typing import Final
 from tests.oracles.clearance import Near, PlatformClearance
 
 from cosmic.frame.clock import Clock
+from cosmic.twin.stage import Path as Course
 from cosmic.twin.stage import Stage
 
 ROOT: Final = Path(__file__).resolve().parents[1]
@@ -24,6 +26,8 @@ BEHIND_S: Final = 0.05
 """The watch looks so far behind the present, s of the platform."""
 FORGOTTEN_S: Final = 0.5
 """Attacks wait while the watch is farther behind than this, s of the platform."""
+KEPT_S: Final = 300.0
+"""Movements that ended so long before what was looked at last are forgotten, s of the platform."""
 STANDING_PER_S: Final = 1e-3
 COARSEST_S: Final = 0.05
 RESTING_S: Final = 0.5
@@ -36,7 +40,7 @@ class Findings:
     too_near: list[str] = field(default_factory=list)
     late_stops: list[str] = field(default_factory=list)
     outside: list[str] = field(default_factory=list)
-    unseen: set[str] = field(default_factory=set)
+    late_plans: int = 0
     least: Near | None = None
     looks: int = 0
     behind_s: float = 0.0
@@ -44,7 +48,64 @@ class Findings:
     @property
     def harmless(self) -> bool:
         """True while nothing went wrong."""
-        return not (self.too_near or self.late_stops or self.outside or self.unseen)
+        return not (self.too_near or self.late_stops or self.outside)
+
+
+class Track:
+    """Every movement of one stage from now on: a stage itself remembers only the last 64.
+
+    A process that was halted, or has much to catch up with, looks farther back than those.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+        self._courses = [stage.path]
+        self._late_s: list[float] = []
+        self._seen_until_s = 0.0
+        self._others = stage.planned
+        stage.planned = self._planned
+
+    def _planned(self, course: Course) -> None:
+        """Take note of a movement; the thread that plans it, with the lock of a controller."""
+        cut = course.times_s[0] == self._courses[-1].times_s[0]  # a stop: it is new from there on
+        self._courses.append(course)
+        from_s = course.times_s[-2 if cut and len(course.times_s) > 1 else 0]
+        if from_s < self._seen_until_s:
+            self._late_s.append(from_s)
+        if self._others is not None:
+            self._others(course)
+
+    def look_until(self, time_s: float) -> float:
+        """Say that what comes before `time_s` is judged; return from when on it must be anew.
+
+        A movement that began before, and was planned only now, changes what was looked at.
+        """
+        self._seen_until_s = from_s = time_s
+        while self._late_s:
+            from_s = min(from_s, self._late_s.pop())
+        return from_s
+
+    def forget(self, before_s: float) -> None:
+        """Forget what was over before `before_s`."""
+        begun = [n for n, each in enumerate(self._courses) if each.times_s[0] <= before_s]
+        del self._courses[: begun[-1] if begun else 0]
+
+    def position(self, time_s: float) -> float:
+        """Return where the stage was at `time_s`."""
+        courses = self._courses
+        course = next((c for c in reversed(courses) if c.times_s[0] <= time_s), courses[0])
+        low, high = self._stage.bounds
+        return min(max(course.at(time_s), low), high)
+
+    def leg(self, time_s: float) -> tuple[float, float]:
+        """Return its speed at `time_s` without sign, and until when it stays so."""
+        until_s = math.inf
+        for course in reversed(self._courses):
+            if course.times_s[0] <= time_s:
+                speed, end_s = course.leg(time_s)
+                return speed, min(end_s, until_s)
+            until_s = min(until_s, course.times_s[0])
+        return 0.0, until_s
 
 
 class Watch(threading.Thread):
@@ -71,7 +132,7 @@ class Watch(threading.Thread):
         )
         assert self._oracle.stdin is not None
         self._to_oracle = self._oracle.stdin
-        self._stages = dict(stages)
+        self._tracks = {name: Track(stage) for name, stage in stages.items()}
         self._clock = clock
         self._limits = dict(limits)
         self._lock = threading.Lock()
@@ -118,32 +179,27 @@ class Watch(threading.Thread):
     def _march(self, until_s: float) -> None:
         while self._at_s < until_s:
             at_s = self._at_s
-            lost = self._lost_sight_of(at_s)
-            if lost:
-                # Before, nobody knows where it was: with others of that time it means nothing.
-                self.found.unseen.update(lost)
-                self._at_s = min(until_s, max(lost.values()))
-                continue
-            legs = {name: each.leg_then(at_s) for name, each in self._stages.items()}
+            legs = {name: each.leg(at_s) for name, each in self._tracks.items()}
             knot_s = min(end_s for _, end_s in legs.values())
             # Straight on until the next knot of any stage, a few degrees or a quarter mm.
             moving = any(speed > 0.0 for speed, _ in legs.values())
             longest_s = COARSEST_S if moving else RESTING_S
             self._at_s = min(until_s, max(at_s + 1e-5, min(knot_s, at_s + longest_s)))
+            late_s = min(each.look_until(self._at_s) for each in self._tracks.values())
+            if late_s < at_s:
+                self._at_s = late_s
+                self.found.late_plans += 1
+                continue
             self._judge(at_s, {name: speed for name, (speed, _) in legs.items()})
             self.found.behind_s = max(self.found.behind_s, self._clock.now_s() - self._at_s)
-
-    def _lost_sight_of(self, at_s: float) -> dict[str, float]:
-        """Return the stages that have forgotten where they were, and from when on they know."""
-        kept = {name: each.paths for name, each in self._stages.items()}
-        since = {name: paths[0].times_s[0] for name, paths in kept.items() if len(paths) > 1}
-        return {name: from_s for name, from_s in since.items() if at_s < from_s}
+        for each in self._tracks.values():
+            each.forget(self._at_s - KEPT_S)
 
     def _judge(self, at_s: float, speeds: Mapping[str, float]) -> None:
         found = self.found
         found.looks += 1
-        positions = {name: each.position_then(at_s) for name, each in self._stages.items()}
-        after = {name: each.position_then(self._at_s) for name, each in self._stages.items()}
+        positions = {name: each.position(at_s) for name, each in self._tracks.items()}
+        after = {name: each.position(self._at_s) for name, each in self._tracks.items()}
         pickle.dump((at_s, positions, after), self._to_oracle)
         with self._lock:
             stopped_from_s, swept = self._stopped_from_s, set(self._swept)

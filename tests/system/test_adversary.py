@@ -1,10 +1,18 @@
 """Hostile commands through all ways in, shortly; `benchmarks.adversary` is long."""
 
+import math
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
+from benchmarks.adversary_attacks import OrderAttack
+from benchmarks.adversary_watch import Track
 
+from cosmic.mico.core.motion.messages import Order
+from cosmic.mico.core.motion.orders import Calibrate, MoveTo, Reference
+from cosmic.twin.settings import shipped_settings
+from cosmic.twin.stage import Stage
 from oracles.clearance import PlatformClearance
 
 OPEN = {"left.gripper": 300.0, "right.gripper": 300.0}
@@ -50,3 +58,87 @@ def test_no_hostile_command_does_harm(repository):
         command, cwd=repository, capture_output=True, text=True, timeout=280, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.fixture
+def stage():
+    kind = shipped_settings().kinds["linear"]
+    return Stage("left.z", kind, start=0.0, seed=1)
+
+
+def _go(stage, at_s, target):
+    route = stage.route(at_s)
+    route.go(target, 1000.0)
+    stage.follow(route, held_until_s=math.inf)
+
+
+def test_the_oracle_still_knows_what_a_stage_has_forgotten(stage):
+    track = Track(stage)
+    _go(stage, 1.0, 5600.0)
+    for number in range(200):
+        _go(stage, 10.0 + 0.01 * number, 5000.0)
+    assert stage.position_then(5.0) != pytest.approx(4000.0)
+    assert track.position(5.0) == pytest.approx(4000.0)
+    assert track.leg(5.0) == (pytest.approx(1000.0), pytest.approx(6.6))
+    track.forget(10.005)
+    assert track.position(10.005) == pytest.approx(5595.0)
+
+
+def test_a_movement_planned_later_than_it_began_is_looked_at_anew(stage):
+    # A process that is halted between reading the time and planning does that.
+    track = Track(stage)
+    assert track.look_until(2.0) == 2.0
+    _go(stage, 1.5, 100.0)
+    assert track.look_until(2.1) == 1.5
+    assert track.look_until(2.2) == 2.2
+    stage.halt(2.3, coast_s=0.0, within_s=0.0)
+    assert track.look_until(2.4) == 2.4
+
+
+def _platform_without_parts(submitted):
+    addresses = {"left.x": (0, 0), "left.z": (0, 2), "probe.y": (2, 1), "table.rotation": (3, 0)}
+
+    def device(name):
+        number = addresses[name.replace("_", ".", 1)][0]
+
+        def submit(order):
+            submitted.append((number, order))
+
+        return SimpleNamespace(submit=submit)
+
+    axes = {
+        name: SimpleNamespace(
+            name=name.replace(".", "_"),
+            details=SimpleNamespace(address=SimpleNamespace(device=place[0], channel=place[1])),
+        )
+        for name, place in addresses.items()
+    }
+    devices = {axis.name: device(axis.name) for axis in axes.values()}
+    manager = SimpleNamespace(
+        device=devices.__getitem__,
+        latch=SimpleNamespace(state=SimpleNamespace(epoch=0)),
+    )
+
+    class Mico(list):
+        names = tuple(axes)
+        application = SimpleNamespace(manager=manager)
+
+        def __getitem__(self, name):
+            return axes[name]
+
+    return SimpleNamespace(mico=Mico(axes.values())), devices
+
+
+def test_a_forged_run_over_the_whole_travel_is_nobody_s_right_but_on_the_axes_let_off():
+    # A reference leads beyond the soft limits, and whoever has the lease may have it run.
+    submitted = []
+    rig, devices = _platform_without_parts(submitted)
+    attack = OrderAttack(rig, 1)
+    for _ in range(4000):
+        devices["left_z"].submit(Order(2, MoveTo(0.0, "um"), "the holder's"))
+        attack.act()
+    assert attack.raw == []
+    sweeps = [(n, o) for n, o in submitted if isinstance(o.motion, Calibrate | Reference)]
+    rightful = [(n, o) for n, o in sweeps if o.token == "the holder's" and o.reservation is None]
+    assert {(number, order.channel) for number, order in rightful} == {(2, 1), (3, 0)}
+    assert len(sweeps) > 2 * len(rightful)
