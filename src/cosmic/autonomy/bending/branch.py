@@ -147,9 +147,15 @@ def rough(points: Points, branch: Mask, baseline_un: Floats) -> Rough:
     return Rough(float(positions[best]), float(k[best]))
 
 
+def through_highest(points: Points, branch: Mask, baseline_un: Floats, k_un_um: float) -> Rough:
+    """Return the branch of a known stiffness that goes through the highest force."""
+    height = (points.force_un - baseline_un)[branch]
+    highest = int(np.argmax(height))
+    return Rough(float(points.way_um[branch][highest] - height[highest] / k_un_um), k_un_um)
+
+
 NEAR_RANGE: Final = 0.98
 NEIGHBOURS: Final = 3
-LEAST_CLEAR: Final = 2
 LOST_PART: Final = 0.4
 """Of the highest force so far: less than this farther out is a force that was lost."""
 
@@ -170,10 +176,10 @@ def touched(points: Points, drift_un_sqrt_s: float) -> bool:
     return bool(np.max(mean) > CLEAR_SIGMAS * noise)
 
 
-def rises(points: Points, travel: Mask) -> bool:
-    """Return whether a few points of one way stand clear of the baseline."""
+def clear_points(points: Points, travel: Mask) -> int:
+    """Return how many points of one way stand clear of the baseline."""
     height = (points.force_un - free_force_un(points))[travel]
-    return bool(np.sum(height > CLEAR_SIGMAS * points.std_un[travel]) >= LEAST_CLEAR)
+    return int(np.sum(height > CLEAR_SIGMAS * points.std_un[travel]))
 
 
 def saturated(span: Span, range_un: float) -> bool:

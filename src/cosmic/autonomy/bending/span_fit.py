@@ -12,12 +12,13 @@ from cosmic.autonomy.bending.branch import (
     Mask,
     Points,
     back_and_forth_percent,
+    clear_points,
     free_force_un,
     lost_while_pushing,
     points_of,
-    rises,
     rough,
     saturated,
+    through_highest,
     touched,
 )
 from cosmic.autonomy.bending.branch import stuck as clings
@@ -29,6 +30,7 @@ from cosmic.autonomy.bending.span import Span
 
 ROUNDS: Final = 2
 LEAST_OF_A_BRANCH: Final = 3
+LEAST_CLEAR: Final = 2
 CLOSE_SIGMAS: Final = 2.5
 TINY: Final = 1e-4
 BRANCH_STDS: Final = (5.0, 1000.0)
@@ -91,8 +93,10 @@ class _Model:
         self._elapsed_s = points.time_s - points.time_s[0]
         self._lost = _lost(points.time_s)
         # A way back that never touches says where the baseline is, and nothing of the fibre.
-        back = [~points.loading] if rises(points, ~points.loading) else []
-        self.branches = [points.loading, *back]
+        clear = clear_points(points, ~points.loading)
+        self.branches = [points.loading, ~points.loading] if clear else [points.loading]
+        # One point cannot tell stiffness and contact apart: the stiffness is that of the way out.
+        self.tied = 0 < clear < LEAST_CLEAR
 
     def contact(self, values: Floats) -> Floats:
         force = np.zeros(len(self._points.way_um))
@@ -142,6 +146,14 @@ class _Model:
         out, back = (math.log(self._typical(one) / self._typical(other)) for one, other in pairs)
         return out, back
 
+    def tie(self) -> Floats:
+        """Return what holds both ways' stiffnesses together, shape (values,)."""
+        row = np.zeros(2 * len(self.branches) + 3)
+        if self.tied:
+            differ = math.hypot(2.0 * MOST_FRICTION * self.by_friction(), MODEL_PART)
+            row[[0, 2]] = -1.0 / differ, 1.0 / differ
+        return row
+
     def _typical(self, curve: PushedCurve) -> float:
         reach = min(TYPICAL_PART * self.stroke_part, float(curve.deflection[-1]))
         reach = max(reach, float(curve.deflection[1]))
@@ -186,11 +198,14 @@ class _Model:
         start: list[float] = []
         for branch in self.branches:
             first = rough(points, branch, baseline)
+            if start and self.tied:
+                first = through_highest(points, branch, baseline, math.exp(start[0]))
             start += [math.log(max(first.k_un_um, 1e-4)), first.hinge_um]
         values = np.array([*start, baseline[0], 0.0, settings.relaxation_part])
         relaxed_std = max(settings.relaxation_std_part, TINY)
         known = np.zeros(len(values))
         known[-1] = 1.0 / relaxed_std
+        tie = self.tie()
         jacobian = np.eye(len(values))
         chi2 = 0.0
         for _ in range(ROUNDS):
@@ -199,20 +214,22 @@ class _Model:
 
             def misfit(tried: Floats, whiten: Floats = whiten) -> Floats:
                 away = (settings.relaxation_part - tried[-1]) / relaxed_std
-                return np.append(whiten @ (points.force_un - self.total(tried)), away)
+                left = whiten @ (points.force_un - self.total(tried))
+                return np.concatenate([left, [away, -tie @ tried]])
 
             def slopes(tried: Floats, whiten: Floats = whiten) -> Floats:
-                return np.vstack([-whiten @ self.slopes(tried), -known])
+                return np.vstack([-whiten @ self.slopes(tried), -known, -tie])
 
             found = least_squares(
                 misfit, values, jac=slopes, method="lm", x_scale="jac", max_nfev=200
             )
             values, jacobian = found.x, found.jac
-            chi2 = float((found.fun[:-1] ** 2).sum())
+            chi2 = float((found.fun[:-2] ** 2).sum())
         weak = np.array([*BRANCH_STDS * len(self.branches), *BASELINE_STDS, 1.0]) ** -2.0
         information = jacobian.T @ jacobian + np.diag(weak)
         covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
-        return _Found(values, covariance, chi2, len(points.way_um) - len(values) + 1)
+        freedom = len(points.way_um) - len(values) + 1 + int(self.tied)
+        return _Found(values, covariance, chi2, freedom)
 
 
 def _lost(time_s: Floats) -> Floats:

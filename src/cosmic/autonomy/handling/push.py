@@ -285,7 +285,7 @@ class OneSpan:
     def _back(self, contact_um: float) -> Steps:
         push = self._push
         top, end = self._points.way_um[-1], contact_um - push.retreat_um / 2.0
-        for travel in np.linspace(top, end, push.steps_back + 1)[1:].tolist():
+        for travel in places_back_um(top, contact_um, end, push.steps_back):
             yield from self._to(travel, push.average_s, loading=False)
         yield from self._to(contact_um - push.retreat_um, push.average_s, loading=False)
 
@@ -310,6 +310,24 @@ class OneSpan:
                 shape=shape,
             )
         )
+
+
+LEAST_BACK: Final = 5
+"""Readings of the way back until where the fibre was met."""
+
+LEAST_FREE: Final = 2
+
+
+def places_back_um(top_um: float, contact_um: float, end_um: float, steps: int) -> list[float]:
+    """Return where the force is read on the way back: evenly, but enough of it on the fibre.
+
+    A stiff or short span is pushed by a micrometre or two. In steps laid out over the whole way
+    the fibre would be left within one of them, and nothing would be known of the way back.
+    """
+    pressed = max(round(steps * (top_um - contact_um) / (top_um - end_um)), LEAST_BACK)
+    free = max(steps - pressed, LEAST_FREE)
+    on_it = np.linspace(top_um, contact_um, pressed + 1)[1:]
+    return [*on_it.tolist(), *np.linspace(contact_um, end_um, free + 1)[1:].tolist()]
 
 
 TOO_SHORT: Final = "too short"

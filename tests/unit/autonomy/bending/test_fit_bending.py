@@ -291,8 +291,8 @@ def part(span: Span, kept: np.ndarray) -> Span:
 
 @pytest.mark.parametrize(
     "back",
-    [[], [30, 40], [44, 45, 46, 47], [41, 42, 43, 44, 45]],
-    ids=["none", "two", "free", "kink"],
+    [[], [30, 40], [44, 45, 46, 47], [41, 42, 43, 44, 45], [27, 44, 45, 46, 47]],
+    ids=["none", "two", "free", "kink", "one on the fibre"],
 )
 def test_unloading_with_few_points_does_no_harm(back: list[int]) -> None:
     spans = pushed(rig())
@@ -302,6 +302,17 @@ def test_unloading_with_few_points_does_no_harm(back: list[int]) -> None:
     assert found.ei_n_m2 == pytest.approx(whole.ei_n_m2, rel=0.04)
     assert width_percent(found) == pytest.approx(width_percent(whole), rel=0.2)
     assert found.trusted, found.reasons
+
+
+def test_a_slip_shows_in_one_point_of_the_way_back() -> None:
+    spans = pushed(rig())
+    kept = np.array([*range(24), 27, 44, 45, 46, 47])
+    first, *others = (part(span, kept) for span in spans)
+    lost = first.force_un.copy()
+    lost[24] = lost[-4:].mean() + 0.5 * (lost[24] - lost[-4:].mean())
+    found = fit_bending([dataclasses.replace(first, force_un=lost), *others])
+    assert Quality.SLIPPED in found.spans[0].flags
+    assert 0 not in found.used
 
 
 def test_a_span_that_is_not_whole_is_refused_with_what_is_wrong() -> None:
