@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Final, Self, TypeVar, cast
 from weakref import WeakSet
 
 from typing_extensions import override
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from cosmic.autonomy.shipped.fibre_handling import FibreHandling
 
 W = TypeVar("W")
+
+A_CAMPAIGN: Final = "a campaign"
 
 
 @checked_class
@@ -143,6 +145,8 @@ class Rig:
 
         if self._handling is not None and self._handling.running:
             raise NotAvailable("an operation on a fibre is running; wait until it has ended")
+        if self._running() == A_CAMPAIGN:
+            raise NotAvailable("a campaign is running; end it first")
         campaign = campaign_on(self, self._platform, recipe, folder)
         self._runs.add(campaign)
         return campaign
@@ -260,7 +264,7 @@ class Rig:
         for each in list(self._runs):
             if isinstance(each, Campaign):
                 if not each.over and each.phase is not CampaignPhase.READY:
-                    return "a campaign"
+                    return A_CAMPAIGN
             elif not each.over and each.state is not RunState.READY:
                 return each.name
         return ""

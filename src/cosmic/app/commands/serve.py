@@ -14,6 +14,7 @@ from cosmic.app.configuration.gateways import doors
 from cosmic.app.configuration.network import Serving, serving
 from cosmic.app.configuration.platform_file import check_applications, load_platform
 from cosmic.app.platform import Platform, Uses, build_platform
+from cosmic.app.rig import Rig
 from cosmic.app.stations.address import StationAddress, stations_of
 from cosmic.app.stations.host import StationHost
 from cosmic.frame.errors import ConfigError, NotConnectedError
@@ -116,7 +117,10 @@ def serve(options: ServeOptions) -> int:
         if platform.failure:
             raise NotConnectedError(platform.failure)
         audit = at_end.enter_context(PlatformAudit(platform, audit_file()))
+        rig = Rig(platform, "campaigns")
+        at_end.callback(rig.close)
         host = StationHost(platform, how, opened, audit)
+        host.use_rig(rig)
         at_end.callback(host.close)  # first of all, so that nobody is answered any more
         sys.stdout.write("\n".join((host.address, *host.gateways, "")))
         sys.stdout.flush()

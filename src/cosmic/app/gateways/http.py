@@ -50,6 +50,8 @@ MOST_REQUESTS_S: Final = 200.0
 MOST_WAITING: Final = 32
 """So many commands wait for one application."""
 LONGEST_WAIT_S: Final = 60.0
+MCP_WAIT_S: Final = 20.0
+"""So long a tool of MCP waits for the end of what it began; that goes on."""
 FIRST_WORD_S: Final = 3.0
 MOST_OPERATIONS: Final = 256
 SLOWED_AFTER: Final = 20
@@ -332,11 +334,19 @@ class HttpGateway:
             queue = "stops" if order.found.mark.at_once else application
             result = await self._carried_out(request, user, order, queue)
             if isinstance(result, Operation):
-                await self._watched(request, user, result, LONGEST_WAIT_S)
+                await self._watched(request, user, result, MCP_WAIT_S)
+                if not result.done:
+                    return {"goes_on": result.title, "text": result.progress.text}
                 return result.result
             return result
 
-        answer = await self._tools.answer(await _body(request), call)
+        async def look(application: str, path: str) -> object:
+            try:
+                return await self._looked_up(application, [one for one in path.split("/") if one])
+            except HttpError as exc:
+                raise LookupError(str(exc)) from exc
+
+        answer = await self._tools.answer(await _body(request), call, look)
         return Response(status_code=202) if answer is None else JSONResponse(answer)
 
     async def _carried_out(self, request: Request, user: _User, order: Order, queue: str) -> object:
@@ -373,17 +383,22 @@ class HttpGateway:
 
     async def _state(self, request: Request, user: _User) -> Response:
         del user
-        host = self._host(request.path_params["application"])
         steps = [each for each in request.path_params["path"].split("/") if each]
         if not steps or steps[0] != "state":
             raise HttpError(404, "state stands under state; commands are sent with POST")
+        found = await self._looked_up(request.path_params["application"], steps[1:])
+        return JSONResponse(to_json(found))
+
+    async def _looked_up(self, application: str, steps: list[str]) -> object:
+        """Return one value of the state of an application, or all of it."""
+        host = self._host(application)
         values: Any = (await self._job("", host.state, "state")).values
-        for step in steps[1:]:
+        for step in steps:
             values = values if isinstance(values, dict) else to_json(values)
             if not isinstance(values, dict) or step not in values:
                 raise HttpError(404, f"there is no {step[:40]!r} in the state")
             values = values[step]
-        return JSONResponse(to_json(values))
+        return values
 
     async def _job(self, queue: str, action: Callable[[], T], title: str) -> T:
         if self._queues[queue].waiting >= 4 * MOST_WAITING:

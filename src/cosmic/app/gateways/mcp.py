@@ -1,7 +1,7 @@
 """The declared commands as tools of the Model Context Protocol, answered over HTTP."""
 
 import json
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from typing import Any, Final
 
 from cosmic.app.gateways.catalogue import Command, commands_of
@@ -12,6 +12,7 @@ from cosmic.frame.errors import CosmicError
 from cosmic.frame.network.errors import CallRefused
 from cosmic.frame.version import __version__
 
+STATE_TOOL: Final = "read_state"
 PROTOCOL: Final = "2025-06-18"
 _NO_METHOD: Final = -32601
 _BAD_PARAMS: Final = -32602
@@ -20,19 +21,25 @@ _BAD_REQUEST: Final = -32600
 Call = Callable[[str, str, dict[str, Any], tuple[str, ...]], Awaitable[object]]
 """`call(application, function, arguments, keys)` carries out a command and awaits its end."""
 
+Look = Callable[[str, str], Awaitable[object]]
+"""`look(application, path)` returns the state of an application, or one value of it."""
+
 
 class McpTools:
-    """Answers the messages of MCP; each command is a tool."""
+    """Answers the messages of MCP; each command is a tool, and one reads the state."""
 
     def __init__(self, kinds: Mapping[str, type[Declared]]) -> None:
-        self._tools = mcp_tools(kinds)
+        self._kinds = tuple(kinds)
+        self._tools = [_state_tool(kinds), *mcp_tools(kinds)]
         self._commands: dict[str, Command] = {
             tool_name(each): each
             for name, kind in kinds.items()
             for each in commands_of(name, kind)
         }
 
-    async def answer(self, message: Mapping[str, Any], call: Call) -> dict[str, Any] | None:
+    async def answer(
+        self, message: Mapping[str, Any], call: Call, look: Look
+    ) -> dict[str, Any] | None:
         """Return the answer to a message; None to one that wants none."""
         number, method = message.get("id"), message.get("method")
         if message.get("jsonrpc") != "2.0" or not isinstance(method, str):
@@ -49,8 +56,21 @@ class McpTools:
         if method == "tools/list":
             return _result(number, {"tools": self._tools})
         if method == "tools/call":
+            if parameters.get("name") == STATE_TOOL:
+                return await self._looked(number, parameters.get("arguments"), look)
             return await self._called(number, parameters, call)
         return _error(number, _NO_METHOD, f"there is no method {method[:40]!r}")
+
+    async def _looked(self, number: object, given: object, look: Look) -> dict[str, Any]:
+        wanted = given if isinstance(given, dict) else {}
+        application, path = wanted.get("application"), wanted.get("path", "")
+        if application not in self._kinds or not isinstance(path, str):
+            return _error(number, _BAD_PARAMS, f"application is one of {', '.join(self._kinds)}")
+        try:
+            found = await look(application, path)
+        except LookupError as exc:
+            return _error(number, _BAD_PARAMS, str(exc)[:1000])
+        return _result(number, _said(json.dumps(to_json(found)), failed=False))
 
     async def _called(
         self, number: object, parameters: Mapping[str, Any], call: Call
@@ -70,6 +90,24 @@ class McpTools:
         except CosmicError as exc:
             return _result(number, _said(f"{type(exc).__name__}: {exc}"[:1000], failed=True))
         return _result(number, _said(json.dumps(to_json(result)), failed=False))
+
+
+def _state_tool(kinds: Iterable[str]) -> dict[str, Any]:
+    return {
+        "name": STATE_TOOL,
+        "title": "Read the state of an application",
+        "description": "The state of an application, or one value of it by its path.",
+        "inputSchema": {
+            "type": "object",
+            "properties": {
+                "application": {"enum": list(kinds)},
+                "path": {"type": "string", "description": 'Such as "axes/left.x".'},
+            },
+            "required": ["application"],
+            "additionalProperties": False,
+        },
+        "annotations": {"readOnlyHint": True, "destructiveHint": False, "openWorldHint": False},
+    }
 
 
 _WELCOME: Final = {

@@ -1,6 +1,7 @@
 """Offers the applications of this process to others."""
 
 import logging
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import fields
 from typing import TYPE_CHECKING, Final, Protocol, runtime_checkable
@@ -9,6 +10,7 @@ from cosmic.app.audit import PlatformAudit
 from cosmic.app.configuration.gateways import Doors
 from cosmic.app.configuration.network import Serving
 from cosmic.app.gateways.approvals import Approvals
+from cosmic.app.gateways.campaigns import CAMPAIGNS, Campaigns
 from cosmic.app.gateways.opened import Gateways
 from cosmic.app.platform import Platform
 from cosmic.app.stations.facts import ITSELF, StationFacts, StationSide
@@ -16,6 +18,7 @@ from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.declaration import Declared
 from cosmic.frame.errors import ConfigError
+from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.errors import StationAway
 from cosmic.frame.network.host import Host
 from cosmic.frame.network.lease import StationLease
@@ -27,6 +30,7 @@ from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.vico import Vico
 
 if TYPE_CHECKING:
+    from cosmic.app.rig import Rig
     from cosmic.frame.network.wire import Wire
 
 logger = logging.getLogger(__name__)
@@ -97,6 +101,11 @@ class StationHost:
             approvals = Host(APPROVALS, self._approvals)
             undo.callback(approvals.close)
             self._station.host(APPROVALS, approvals)
+            self._campaigns = self._offered_campaigns(sides, platform.policy, undo)
+            if self._campaigns is not None:
+                hosts[CAMPAIGNS] = Host(CAMPAIGNS, self._campaigns)
+                undo.callback(hosts[CAMPAIGNS].close)
+                self._station.host(CAMPAIGNS, hosts[CAMPAIGNS])
             said = {each.name: getattr(facts, each.name) for each in fields(facts)}
             self._gateways = Gateways(
                 self._station, hosts, said, doors or Doors(), self._approvals.ask
@@ -104,6 +113,26 @@ class StationHost:
             undo.callback(self._gateways.close)
             self._undo = undo.pop_all()
         logger.info("%s", self.address)
+
+    @staticmethod
+    def _offered_campaigns(
+        sides: Mapping[str, object], policy: FailurePolicy, undo: ExitStack
+    ) -> Campaigns | None:
+        """Return campaigns where all that they need runs here."""
+        daqco = sides.get("daqco")
+        if not sides.keys() >= {"mico", "daqco", "vico"} or not isinstance(daqco, Host):
+            return None
+        served = daqco.served
+        if not isinstance(served, Daqco):
+            return None
+        made = Campaigns(lambda: served.directory / CAMPAIGNS, policy)
+        undo.callback(made.close)
+        return made
+
+    def use_rig(self, rig: "Rig") -> None:
+        """Have campaigns that others start run on `rig`, beside what else it runs."""
+        if self._campaigns is not None:
+            self._campaigns.use(rig.campaign)
 
     @property
     def address(self) -> str:

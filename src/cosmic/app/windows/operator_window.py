@@ -227,6 +227,8 @@ class OperatorWindow(CosmicServerGui):
             self, self._rig, self._scene, self._platform.policy, beside=MICO
         )
         self._campaign.replayed.connect(self._raise_scene)
+        if self._host is not None:
+            self._host.use_rig(self._rig)
         self._calibrations = add_calibrations(self, self._rig, beside=MICO)
         self.dock(MICO).raise_()
 

@@ -1,0 +1,202 @@
+"""Campaigns at the gateways: by the declaration alone, with the same right and approval."""
+
+import json
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import httpx
+import pytest
+
+from contract.station_rig import free_port, wait_until
+from contract.test_gateway_epics import Client
+from cosmic.app.configuration.gateways import EpicsSettings, HttpClient, HttpSettings
+from cosmic.app.gateways.approvals import Approvals
+from cosmic.app.gateways.campaigns import Campaigns
+from cosmic.app.gateways.epics import EpicsGateway
+from cosmic.app.gateways.http import HttpGateway
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.caller import current_call
+from cosmic.frame.network.host import Host
+from cosmic.frame.network.station import Station
+
+TOKEN = "m" * 20
+
+
+class StandIn:
+    """Behaves as a campaign to whoever starts it: nothing moves."""
+
+    def __init__(self, recipe: Path, folder: Path) -> None:
+        self.recipe = SimpleNamespace(name=recipe.stem)
+        self.store = SimpleNamespace(folder=folder)
+        self.phase, self.operation, self.end_reason, self.shortfall = "ready", "", "", ""
+        self.left_s = 60.0
+        self.progress = SimpleNamespace(done=3, good=2, failed=1, elapsed_s=20.0)
+        self.fibres = ()
+        self.ended = threading.Event()
+        self.by = ""
+        self.changed: Callable[[], object] = lambda: None
+
+    @property
+    def over(self) -> bool:
+        return self.phase in ("ended", "stopped")
+
+    @property
+    def unfinished(self) -> bool:
+        return self.phase == "stopped"
+
+    def on_change(self, listener: Callable[[], object]) -> None:
+        self.changed = listener
+
+    def run_here(self) -> None:
+        call = current_call()
+        self.by = "" if call is None else call.caller.name
+        self.phase, self.operation = "running", "take the fibre"
+        self.changed()
+        self.ended.wait(30.0)
+
+    def pause(self) -> None:
+        self.phase = "paused"
+
+    def resume(self) -> None:
+        self.phase = "running"
+
+    def abort(self, reason: str) -> None:
+        if not self.over:
+            self.phase, self.end_reason = "stopped", reason
+        self.ended.set()
+
+    def end(self) -> None:
+        self.phase, self.end_reason = "ended", "2 good fibres"
+        self.ended.set()
+
+
+@dataclass
+class Door:
+    http: httpx.Client
+    epics: int
+    approvals: Approvals
+    begun: list[StandIn] = field(default_factory=list)
+
+    def command(self, name: str, **arguments: Any) -> httpx.Response:
+        return self.http.post(f"/api/campaigns/{name}", json=arguments)
+
+    def tool(self, name: str, **arguments: Any) -> Any:
+        parameters = {"name": name, "arguments": arguments}
+        said = {"jsonrpc": "2.0", "id": 1, "method": "tools/call", "params": parameters}
+        (found,) = self.http.post("/mcp", json=said).json()["result"]["content"]
+        return found["text"]
+
+
+@contextmanager
+def opened(home: Path, *, approve: bool = False) -> Iterator[Door]:
+    policy, begun = FailurePolicy(), []
+    (home / "mine.toml").write_text("", encoding="utf-8")
+
+    def begin(recipe: Path, folder: Path) -> Any:
+        begun.append(StandIn(recipe, folder))
+        return begun[-1]
+
+    with ExitStack() as at_end:
+        station = Station("fibres", policy)
+        campaigns = Campaigns(lambda: home, policy)
+        campaigns.use(begin)
+        host = Host("campaigns", campaigns)
+        station.host("campaigns", host)
+        at_end.callback(host.close)
+        at_end.callback(campaigns.close)
+        approvals = Approvals(policy)
+        at_end.callback(approvals.close)
+        client = HttpClient(name="lab", token=TOKEN, access="move")
+        web = HttpSettings(listen=f"127.0.0.1:{free_port()}", client=(client,), approve=approve)
+        http = HttpGateway(station, {"campaigns": host}, web, {}, approvals.ask)
+        at_end.callback(http.close)
+        records = EpicsGateway(
+            station, {"campaigns": host}, EpicsSettings(prefix="T:", port=free_port())
+        )
+        at_end.callback(records.close)
+        headers = {"Authorization": f"Bearer {TOKEN}"}
+        made = httpx.Client(base_url=http.address, headers=headers, timeout=30.0)
+        yield Door(at_end.enter_context(made), records.port, approvals, begun)
+
+
+def test_a_campaign_is_started_watched_and_ended_over_http_and_mcp(tmp_path: Path) -> None:
+    with opened(tmp_path) as door:
+        start = {"recipe": "mine", "folder": "first"}
+        refused = door.command("start", **start)
+        assert refused.json()["error"]["verdict"]["reason"] == "NO_LEASE"
+        assert door.begun == []
+        door.http.post("/api/control")
+        assert "quick" in door.command("recipes").json()["result"]
+        assert door.command("start", recipe="mine", folder="../x").status_code == 400
+        assert door.command("start", recipe="/etc/passwd", folder="x").status_code == 400
+        begun = door.command("start", **start)
+        assert begun.status_code == 202
+        assert wait_until(lambda: door.begun[0].phase == "running")
+        assert door.begun[0].by == "lab", "it moves by the right of who started it"
+        assert "end it first" in door.command("start", **start).json()["error"]["text"]
+        where = f"/api/operations/{begun.json()['operation']}"
+        said = "3 fibres, 2 good, take the fibre"
+        assert wait_until(lambda: door.http.get(where).json()["text"] == said)
+        assert json.loads(door.tool("read_state", application="campaigns"))["good"] == 2
+        door.tool("campaigns_pause")
+        assert (
+            json.loads(door.tool("read_state", application="campaigns", path="phase")) == "paused"
+        )
+        assert json.loads(door.tool("campaigns_resume")) is None
+        assert json.loads(door.tool("campaigns_results")) == []
+        door.begun[0].end()
+        assert door.http.get(where, params={"wait": 5}).json()["done"] is True
+        assert door.http.get("/api/campaigns/state/end_reason").json() == "2 good fibres"
+        again = door.command("start", recipe="mine", folder="second").json()["operation"]
+        assert wait_until(lambda: door.begun[1].phase == "running")
+        door.command("abort", reason="enough")
+        ended = door.http.get(f"/api/operations/{again}", params={"wait": 5})
+        assert ended.json()["error"]["text"] == "enough"
+
+
+def test_who_started_a_campaign_and_falls_silent_ends_it(tmp_path: Path) -> None:
+    with opened(tmp_path) as door:
+        door.http.post("/api/control")
+        door.command("start", recipe="mine", folder="first")
+        assert wait_until(lambda: door.begun[0].phase == "stopped", 5.0)
+
+
+def test_a_campaign_waits_for_a_persons_approval(tmp_path: Path) -> None:
+    with opened(tmp_path, approve=True) as door:
+        door.http.post("/api/control")
+        asked = door.command("start", recipe="mine", folder="first")
+        assert asked.json()["text"] == "waits for approval"
+        assert door.begun == []
+        (waiting,) = door.approvals.waiting
+        assert "recipe='mine'" in waiting.details
+        door.approvals.approve(waiting.number)
+        assert wait_until(lambda: bool(door.begun) and door.begun[0].phase == "running")
+        assert door.command("abort").is_success, "what ends it waits for nobody"
+
+
+@pytest.mark.timeout(60)
+def test_a_campaign_is_started_and_watched_as_records_of_epics(tmp_path: Path) -> None:
+    with opened(tmp_path) as door:
+        client, watcher = Client(door.epics), Client(door.epics)
+        try:
+            start = json.dumps({"recipe": "mine", "folder": "first"})
+            assert not client.put("T:campaigns:start", start)
+            assert "right to move" in client.get("T:campaigns:start")
+            assert client.put("T:control", 1)
+            held = threading.Thread(target=lambda: client.put("T:campaigns:start", start))
+            held.start()
+            assert wait_until(lambda: watcher.get("T:campaigns:phase") == "running")
+            assert watcher.get("T:campaigns:operation") == "take the fibre"
+            assert watcher.get("T:campaigns:done") == 3
+            assert watcher.put("T:campaigns:abort", '{"reason": "enough"}')
+            held.join(10.0)
+            assert not held.is_alive()
+            assert wait_until(lambda: watcher.get("T:campaigns:end_reason") == "enough")
+        finally:
+            client.end()
+            watcher.end()

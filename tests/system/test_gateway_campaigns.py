@@ -1,0 +1,124 @@
+"""Campaigns over HTTP and EPICS: started, watched, paused and ended by the right to move."""
+
+import json
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from websockets.sync.client import connect
+
+from contract.station_rig import free_port, wait_until
+from cosmic.app.configuration.gateways import EpicsSettings, HttpClient, HttpSettings, doors
+from cosmic.app.configuration.network import NetworkSettings, serving
+from cosmic.app.platform import build_platform
+from cosmic.app.rig import Rig
+from cosmic.app.stations.host import StationHost
+
+pytestmark = pytest.mark.slow
+TOKEN = "m" * 20
+RECIPE = """
+procedure = "transport"
+[stop]
+good = 1
+time_s = 1800.0
+[output]
+html = false
+pdf = false
+table = false
+"""
+
+
+@dataclass
+class Served:
+    rig: Rig
+    http: httpx.Client
+    port: int
+
+    @contextmanager
+    def line(self, *topics: str) -> Iterator[Any]:
+        """Give a WebSocket, which keeps the right to move alive; what it follows is to be read."""
+        where = str(self.http.base_url).replace("http", "ws").rstrip("/") + "/api/events"
+        with connect(where, proxy=None) as made:
+            made.send(json.dumps({"token": TOKEN, "follow": topics}))
+            assert json.loads(made.recv(5.0))["topic"] == "hello"
+            yield made
+
+    def state(self, name: str) -> Any:
+        return self.http.get(f"/api/campaigns/state/{name}").json()
+
+    def command(self, name: str, **arguments: Any) -> httpx.Response:
+        return self.http.post(f"/api/campaigns/{name}", json=arguments)
+
+
+@pytest.fixture
+def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
+    monkeypatch.chdir(tmp_path)
+    with ExitStack() as at_end:
+        platform = build_platform(rate=20.0, sample="three-dry")
+        rig = Rig(platform, "campaigns")
+        at_end.callback(rig.close)
+        platform.initialize()
+        where = serving(
+            NetworkSettings(), "fibres", platform.path, listen=f"tcp/127.0.0.1:{free_port()}"
+        )
+        client = HttpClient(name="lab", token=TOKEN, access="move")
+        web = HttpSettings(listen=f"127.0.0.1:{free_port()}", client=(client,))
+        records = EpicsSettings(prefix="T:", port=free_port())
+        host = StationHost(platform, where, doors(web, records))
+        host.use_rig(rig)
+        at_end.callback(host.close)
+        home = rig.daqco.directory / "campaigns"
+        home.mkdir(parents=True, exist_ok=True)
+        (home / "one.toml").write_text(RECIPE, encoding="utf-8")
+        headers = {"Authorization": f"Bearer {TOKEN}"}
+        http = httpx.Client(base_url=f"http://{web.listen}", headers=headers, timeout=90.0)
+        yield Served(rig, at_end.enter_context(http), records.port)
+
+
+@pytest.mark.timeout(300)
+def test_a_campaign_is_carried_out_for_a_client_of_http(served: Served) -> None:
+    assert "one" in served.command("recipes").json()["result"]
+    refused = served.command("start", recipe="one", folder="first")
+    assert refused.json()["error"]["verdict"]["reason"] == "NO_LEASE"
+    with served.line():
+        assert served.http.post("/api/control").is_success
+        begun = served.command("start", recipe="one", folder="first")
+        assert begun.status_code == 202, begun.text
+        again = served.command("start", recipe="one", folder="second")
+        assert "a campaign is running" in again.json()["error"]["text"]
+        assert served.command("start", recipe="one", folder="../out").status_code == 400
+        assert wait_until(lambda: served.state("operation") != "", 30.0)
+        assert served.command("pause").is_success
+        assert wait_until(lambda: served.state("phase") == "paused", 60.0)
+        assert served.command("resume").is_success
+        where = f"/api/operations/{begun.json()['operation']}"
+        until = time.monotonic() + 200.0
+        while (now := served.http.get(where, params={"wait": 10}).json()).get("done") is not True:
+            assert "error" not in now, now
+            assert time.monotonic() < until, now
+        assert served.state("phase") == "ended"
+        with served.line("campaigns/state") as watching:
+            told = json.loads(watching.recv(5.0))
+        assert (told["topic"], told["payload"]["good"]) == ("campaigns/state", 1)
+        (fibre,) = [
+            each for each in served.command("results").json()["result"] if each["outcome"] == "good"
+        ]
+        assert fibre["length_um"] > 100.0
+
+
+@pytest.mark.timeout(200)
+def test_a_campaign_ends_with_the_client_that_started_it(served: Served) -> None:
+    with served.line():
+        served.http.post("/api/control")
+        assert served.command("start", recipe="one", folder="first").status_code == 202
+        assert wait_until(lambda: served.state("operation") != "", 30.0)
+    assert wait_until(lambda: served.state("phase") in ("stopped", "failed"), 30.0)
+    assert served.http.get("/api/station").json()["control"]["local"]
+    before = served.rig.mico["left.z"].position_um
+    time.sleep(0.3)
+    assert served.rig.mico["left.z"].position_um == pytest.approx(before, abs=0.2)
