@@ -8,6 +8,9 @@ does the same to MiCo and ViCo through a station. DAQCo records, ViCo is live. T
 says whether any watched pair came nearer than its margin by more than a sensor's step, whether
 anything moved after a stop, and whether an axis left its soft limits. A run that is not harmless
 ends with exit code 1 and what was seen.
+
+With `--halt-s 20` all its processes are halted for so long again and again, as on a computer that
+is suspended, while the platform's time runs on: what was sent goes on, and nobody stops it.
 """
 
 import argparse
@@ -21,7 +24,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 from unittest.mock import patch
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -44,6 +47,7 @@ from cosmic.app.platform import Platform, build_platform
 from cosmic.app.rig import Rig
 from cosmic.app.simulation import make_scene
 from cosmic.app.stations.host import StationHost
+from cosmic.frame.clock import RatedClock
 from cosmic.twin.scene import Scene
 
 NAME = "adversary"
@@ -70,6 +74,34 @@ def _free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+HALT: Final = """
+import os, signal, sys, time
+parent, halt_s = os.getppid(), float(sys.argv[2])
+while os.getppid() == parent:
+    time.sleep(15.0)
+    os.killpg(int(sys.argv[1]), signal.SIGSTOP)
+    time.sleep(halt_s)
+    os.killpg(int(sys.argv[1]), signal.SIGCONT)
+"""
+
+
+@contextmanager
+def halted(halt_s: float) -> Iterator[None]:
+    """Halt this process and its children for `halt_s` again and again; never with 0."""
+    if sys.platform == "win32" or halt_s <= 0.0:
+        yield
+        return
+    os.setpgid(0, 0)  # whoever started this goes on
+    command = [sys.executable, "-c", HALT, str(os.getpgrp()), str(halt_s)]
+    halting = subprocess.Popen(command, start_new_session=True)
+    try:
+        with patch("cosmic.app.platform.RatedClock", lambda rate, **_: RatedClock(rate)):
+            yield
+    finally:
+        halting.kill()
+        halting.wait()
 
 
 @contextmanager
@@ -227,15 +259,19 @@ def main() -> int:
     parser.add_argument("--rate", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--no-station", action="store_true")
+    if sys.platform != "win32":
+        parser.add_argument("--halt-s", type=float, default=0.0, help="halt all for so long")
+    parser.set_defaults(halt_s=0.0)
     options = parser.parse_args()
     began_s = time.perf_counter()
-    result = attack(
-        options.commands,
-        rate=options.rate,
-        seed=options.seed,
-        client=not options.no_station,
-        minutes=options.minutes,
-    )
+    with halted(options.halt_s):
+        result = attack(
+            options.commands,
+            rate=options.rate,
+            seed=options.seed,
+            client=not options.no_station,
+            minutes=options.minutes,
+        )
     print(table(figures(result)))
     print(f"\n{time.perf_counter() - began_s:.0f} s; {result.by_way}; refused {result.refused}")
     for title in ("too_near", "late_stops", "outside"):

@@ -60,6 +60,17 @@ def test_no_hostile_command_does_harm(repository):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+@pytest.mark.skipif(sys.platform == "win32", reason="processes are halted by SIGSTOP")
+def test_a_computer_that_stands_still_lets_nothing_come_too_near(repository):
+    command = [sys.executable, "-m", "benchmarks.adversary", "--minutes", "0.7", "--halt-s", "5"]
+    done = subprocess.run(
+        command, cwd=repository, capture_output=True, text=True, timeout=280, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 @pytest.fixture
 def stage():
     kind = shipped_settings().kinds["linear"]
