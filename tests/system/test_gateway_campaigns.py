@@ -1,9 +1,12 @@
-"""Campaigns over HTTP and EPICS: started, watched, paused and ended by the right to move."""
+"""A campaign over HTTP on the simulated platform: started, watched, paused, carried out, ended."""
 
 import json
+import re
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,14 +16,8 @@ import pytest
 from websockets.sync.client import connect
 
 from contract.station_rig import free_port, wait_until
-from cosmic.app.configuration.gateways import EpicsSettings, HttpClient, HttpSettings, doors
-from cosmic.app.configuration.network import NetworkSettings, serving
-from cosmic.app.platform import build_platform
-from cosmic.app.rig import Rig
-from cosmic.app.stations.host import StationHost
 
 pytestmark = pytest.mark.slow
-TOKEN = "m" * 20
 RECIPE = """
 procedure = "transport"
 [stop]
@@ -35,16 +32,15 @@ table = false
 
 @dataclass
 class Served:
-    rig: Rig
     http: httpx.Client
-    port: int
+    token: str
 
     @contextmanager
     def line(self, *topics: str) -> Iterator[Any]:
         """Give a WebSocket, which keeps the right to move alive; what it follows is to be read."""
         where = str(self.http.base_url).replace("http", "ws").rstrip("/") + "/api/events"
         with connect(where, proxy=None) as made:
-            made.send(json.dumps({"token": TOKEN, "follow": topics}))
+            made.send(json.dumps({"token": self.token, "follow": topics}))
             assert json.loads(made.recv(5.0))["topic"] == "hello"
             yield made
 
@@ -56,28 +52,28 @@ class Served:
 
 
 @pytest.fixture
-def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
-    monkeypatch.chdir(tmp_path)
-    with ExitStack() as at_end:
-        platform = build_platform(rate=20.0, sample="three-dry")
-        rig = Rig(platform, "campaigns")
-        at_end.callback(rig.close)
-        platform.initialize()
-        where = serving(
-            NetworkSettings(), "fibres", platform.path, listen=f"tcp/127.0.0.1:{free_port()}"
-        )
-        client = HttpClient(name="lab", token=TOKEN, access="move")
-        web = HttpSettings(listen=f"127.0.0.1:{free_port()}", client=(client,))
-        records = EpicsSettings(prefix="T:", port=free_port())
-        host = StationHost(platform, where, doors(web, records))
-        host.use_rig(rig)
-        at_end.callback(host.close)
-        home = rig.daqco.directory / "campaigns"
-        home.mkdir(parents=True, exist_ok=True)
-        (home / "one.toml").write_text(RECIPE, encoding="utf-8")
-        headers = {"Authorization": f"Bearer {TOKEN}"}
-        http = httpx.Client(base_url=f"http://{web.listen}", headers=headers, timeout=90.0)
-        yield Served(rig, at_end.enter_context(http), records.port)
+def served(tmp_path: Path) -> Iterator[Served]:
+    """A station in a process of its own, so that what it computes silences no client here."""
+    (tmp_path / "campaigns").mkdir()
+    (tmp_path / "campaigns" / "one.toml").write_text(RECIPE, encoding="utf-8")
+    command = [sys.executable, "-m", "cosmic", "serve", "--rate", "8", "--sample", "three-dry"]
+    command += ["--http", f"127.0.0.1:{free_port()}", "--listen", f"tcp/127.0.0.1:{free_port()}"]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=tmp_path
+    )
+    try:
+        assert process.stdout is not None
+        found = None
+        while found is None:
+            line = process.stdout.readline()
+            assert line, "the station did not start"
+            found = re.search(r"HTTP at (\S+) \(token (\S+)\)", line)
+        headers = {"Authorization": f"Bearer {found[2]}"}
+        with httpx.Client(base_url=found[1], headers=headers, timeout=90.0) as http:
+            yield Served(http, found[2])
+    finally:
+        process.terminate()
+        process.communicate(timeout=60)
 
 
 @pytest.mark.timeout(300)
@@ -119,6 +115,7 @@ def test_a_campaign_ends_with_the_client_that_started_it(served: Served) -> None
         assert wait_until(lambda: served.state("operation") != "", 30.0)
     assert wait_until(lambda: served.state("phase") in ("stopped", "failed"), 30.0)
     assert served.http.get("/api/station").json()["control"]["local"]
-    before = served.rig.mico["left.z"].position_um
+    path = "/api/mico/state/axes/left.z/_latest/position"
+    before = served.http.get(path).json()
     time.sleep(0.3)
-    assert served.rig.mico["left.z"].position_um == pytest.approx(before, abs=0.2)
+    assert served.http.get(path).json() == pytest.approx(before, abs=0.2)
