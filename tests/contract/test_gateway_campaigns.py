@@ -112,8 +112,10 @@ def opened(home: Path, *, approve: bool = False) -> Iterator[Door]:
         approvals = Approvals(policy)
         at_end.callback(approvals.close)
         client = HttpClient(name="lab", token=TOKEN, access="move")
-        web = HttpSettings(listen=f"127.0.0.1:{free_port()}", client=(client,), approve=approve)
-        http = HttpGateway(station, {"campaigns": host}, web, {}, approvals.ask)
+        web = HttpSettings(listen=f"127.0.0.1:{free_port()}", client=(client,))
+        http = HttpGateway(
+            station, {"campaigns": host}, web, {}, approvals.ask if approve else None
+        )
         at_end.callback(http.close)
         records = EpicsGateway(
             station, {"campaigns": host}, EpicsSettings(prefix="T:", port=free_port())

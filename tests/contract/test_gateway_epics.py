@@ -6,16 +6,18 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import pytest
 
 from contract.cabinet import Cabinet, WithBell
 from contract.station_rig import free_port, wait_until
-from cosmic.app.configuration.gateways import EpicsSettings
+from cosmic.app.configuration.gateways import Doors, EpicsSettings, HttpSettings
+from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.epics import EpicsGateway
 from cosmic.frame.failure import Failure, FailurePolicy
 from cosmic.frame.network.host import Host
@@ -65,7 +67,9 @@ class Door:
 
 
 @contextmanager
-def opened(kind: type[Cabinet] = Cabinet, *, write: bool = True) -> Iterator[Door]:
+def opened(
+    kind: type[Cabinet] = Cabinet, *, write: bool = True, approvals: Approvals | None = None
+) -> Iterator[Door]:
     home, policy = kind(), FailurePolicy()
     failures: list[Failure] = []
     policy.subscribe(failures.append)
@@ -73,7 +77,8 @@ def opened(kind: type[Cabinet] = Cabinet, *, write: bool = True) -> Iterator[Doo
     host = Host("cabinet", home)
     station.host("cabinet", host)
     settings = EpicsSettings(prefix="T:", port=free_port(), write=write)
-    gateway = EpicsGateway(station, {"cabinet": host}, settings)
+    ask = None if approvals is None else approvals.ask
+    gateway = EpicsGateway(station, {"cabinet": host}, settings, ask)
     try:
         yield Door(home, station, gateway.port, failures)
     finally:
@@ -129,6 +134,58 @@ def test_a_gateway_that_only_shows_still_lets_everybody_stop() -> None:
         assert client.put("T:cabinet:stop", "{}")
         assert door.home.stops == 1
         assert door.home.name == "lamp"
+
+
+@pytest.fixture
+def approvals() -> Iterator[Approvals]:
+    made = Approvals(FailurePolicy())
+    yield made
+    made.close()
+
+
+def test_what_moves_over_epics_waits_for_a_person(approvals: Approvals) -> None:
+    move = "T:cabinet:drawers:left_x:move"
+    with opened(approvals=approvals) as door, used(door) as client, used(door) as other:
+
+        def asked(target_um: float) -> Thread:
+            def put() -> None:
+                with suppress(json.JSONDecodeError):  # killed while it waits
+                    answers.append(client.put(move, json.dumps({"target_um": target_um})))
+
+            made = Thread(target=put)
+            made.start()
+            assert wait_until(lambda: approvals.waiting != ())
+            return made
+
+        answers: list[bool] = []
+        assert client.put("T:control", 1)
+        held = asked(5.0)
+        assert door.home.drawers["left.x"].moved_um == []
+        assert approvals.waiting[0].details == "left.x, target_um=5.0"
+        approvals.approve(approvals.waiting[0].number)
+        held.join(10.0)
+        held = asked(6.0)
+        approvals.refuse(approvals.waiting[0].number)
+        held.join(10.0)
+        held = asked(7.0)
+        assert other.put("T:cabinet:stop", "{}"), "a stop waits for nobody"
+        held.join(10.0)
+        assert answers == [True, False, False]
+        assert approvals.waiting == (), "what was stopped does not wait any more"
+        assert door.home.drawers["left.x"].moved_um == [5.0]
+        held = asked(8.0)
+        client.process.send_signal(signal.SIGKILL)
+        held.join(10.0)
+        assert wait_until(lambda: approvals.waiting == ()), "who is gone asks for nothing"
+    assert door.home.drawers["left.x"].moved_um == [5.0]
+
+
+def test_who_asks_at_one_door_leaves_no_other_open() -> None:
+    asking, quiet = EpicsSettings(prefix="T:", approve=True), EpicsSettings(prefix="T:")
+    web = HttpSettings(listen="127.0.0.1:8470")
+    assert Doors(web, asking).asks_first
+    assert Doors(web.model_copy(update={"approve": True}), quiet).asks_first
+    assert not Doors(web, quiet).asks_first
 
 
 def test_bytes_that_are_no_channel_access_harm_nobody() -> None:

@@ -57,6 +57,7 @@ class EpicsSettings(StrictModel):
     interface: str = "127.0.0.1"
     port: int = Field(default=0, ge=0, le=65_535)
     write: bool = True
+    approve: bool = False
     step_um: float = Field(default=0.5, gt=0.0, allow_inf_nan=False)
 
 
@@ -73,6 +74,12 @@ class Doors:
     http: HttpSettings | None = None
     epics: EpicsSettings | None = None
     token: str = ""
+
+    @property
+    def asks_first(self) -> bool:
+        """What moves waits for a person at every door: who asks at one leaves none open."""
+        opened = (self.http, self.epics)
+        return any(each is not None and each.approve for each in opened)
 
 
 def doors(

@@ -84,6 +84,7 @@ class EpicsGateway:
         self._states: dict[tuple[str, ...], Channel] = {}
         self._images: dict[str, tuple[Channel, Channel, Channel, Channel]] = {}
         self._looked = 0
+        self._going: dict[tuple[str, tuple[str, ...]], list[Operation[Any]]] = {}
         self._control = ca.whole(put=self._take)
         self._holder = ca.line()
         channels = dict(self._all_channels())
@@ -220,10 +221,24 @@ class EpicsGateway:
         job = queue.submit(lambda: session.carry_out(order), order.title)
         await _ended(job)
         result = job.result
+        if order.found.mark.at_once:
+            self._take_back(application, keys)
         if isinstance(result, Operation):
-            await _ended(result)
+            going = self._going.setdefault((application, keys), [])
+            going.append(result)
+            try:
+                await _ended(result)
+            finally:
+                going.remove(result)
             return result.result
         return result
+
+    def _take_back(self, application: str, keys: tuple[str, ...]) -> None:
+        """End what waits where something was halted: an approval would come too late for it."""
+        for (of, at), going in list(self._going.items()):
+            if of == application and at[: len(keys)] == keys:
+                for each in list(going):
+                    each.cancel()
 
     async def _take(self, who: Who, value: int) -> None:
         session = self._session(who)

@@ -112,6 +112,8 @@ class HttpGateway:
         The declared applications.
     facts : mapping
         What the station says of itself.
+    approve : callable or None
+        Asked before a command that moves is carried out.
 
     Raises
     ------
@@ -140,7 +142,7 @@ class HttpGateway:
             for name, kind in kinds.items()
             for each in commands_of(name, kind)
         }
-        self._approve = approve if settings.approve else None
+        self._approve = approve
         self._users = {
             sha256(each.token.encode()).digest(): self._user(each) for each in settings.client
         }

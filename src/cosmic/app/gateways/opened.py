@@ -40,12 +40,13 @@ class Gateways:
         approve: "Approve | None" = None,
     ) -> None:
         self._lines: list[str] = []
+        asked = approve if doors.asks_first else None
         with ExitStack() as undo:
             if doors.http is not None:
                 require("http")
                 from cosmic.app.gateways.http import HttpGateway
 
-                http = HttpGateway(station, hosts, doors.http, facts, approve)
+                http = HttpGateway(station, hosts, doors.http, facts, asked)
                 undo.callback(http.close)
                 said = f" (token {doors.token})" if doors.token else ""
                 self._lines.append(f"HTTP at {http.address}{said}")
@@ -53,7 +54,7 @@ class Gateways:
                 require("epics")
                 from cosmic.app.gateways.epics import EpicsGateway
 
-                epics = EpicsGateway(station, hosts, doors.epics)
+                epics = EpicsGateway(station, hosts, doors.epics, asked)
                 undo.callback(epics.close)
                 self._lines.append(f"EPICS at {epics.address}")
             self._undo = undo.pop_all()

@@ -74,6 +74,7 @@ class GatewaySession:
         self._numbers = count(1)
         self._lock = Lock()
         self._operations: OrderedDict[str, Operation[Any]] = OrderedDict()
+        self._asked: list[Operation[Any]] = []
         self._tickets = Tickets(self._on_event)
         self._forget = station.lease.subscribe(self._on_lease)
 
@@ -122,8 +123,15 @@ class GatewaySession:
         self._tickets.cancel_motion()
 
     def close(self, why: str = "its gateway closes") -> None:
-        """End the session; what it moves stops. Harmless the second time."""
+        """End the session; what it moves stops, what waits for approval is taken back.
+
+        Harmless the second time.
+        """
         self.lose_motion(why)
+        with self._lock:
+            asked, self._asked = self._asked, []
+        for each in asked:
+            each.cancel()
         self._forget()
 
     # Commands
@@ -175,7 +183,11 @@ class GatewaySession:
         """
         mark = order.found.mark
         if self._approve is not None and mark.moves and not mark.at_once:
-            return self._approve(self.name, order, lambda: self._invoke(order))
+            asked = self._approve(self.name, order, lambda: self._invoke(order))
+            if isinstance(asked, Operation):
+                with self._lock:
+                    self._asked = [*(each for each in self._asked if not each.done), asked]
+            return asked
         return self._invoke(order)
 
     def _invoke(self, order: Order) -> object:

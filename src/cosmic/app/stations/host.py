@@ -79,7 +79,7 @@ class StationHost:
         if not sides:
             raise ConfigError(f"{how.name}: no application runs here that could be served")
         self._how = how
-        self._asks_first = doors is not None and doors.http is not None and doors.http.approve
+        self._asks_first = doors is not None and doors.asks_first
         lease = StationLease(f"the operator at {how.name}")
         self._station = Station(how.name, platform.policy, lease)
         self._applications = tuple(sides)
@@ -147,7 +147,7 @@ class StationHost:
 
     @property
     def asks_first(self) -> bool:
-        """What a program moves over HTTP waits for a person."""
+        """What a program moves over HTTP or EPICS waits for a person."""
         return self._asks_first
 
     @property
