@@ -106,6 +106,15 @@ def choose(panel: ResultsPanel, qtbot: QtBot, name: str, *, also: bool = False) 
     qtbot.waitUntil(lambda: any(t.path.stem.startswith(name) for t in panel.viewer.timelines))
 
 
+def test_where_nothing_is_chosen_one_sentence_at_the_top_says_what_to_do(
+    panel: ResultsPanel,
+) -> None:
+    viewer = panel.viewer
+    assert "Choose a recording" in viewer.facts.text()
+    assert viewer.facts.geometry().bottom() < viewer.height() / 10
+    assert not any(each.isVisible() for each in (viewer.play, viewer.slider, viewer.export))
+
+
 def test_a_slope_is_read_over_time_and_over_position(
     panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:

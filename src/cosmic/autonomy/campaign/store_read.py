@@ -54,6 +54,9 @@ class CampaignReader:
         CampaignError
             It is not.
         """
+        if not (self.folder / DATABASE).exists():
+            what = f"there is no {DATABASE} in it" if self.folder.is_dir() else "it is no folder"
+            raise CampaignError(f"{self.folder} holds no campaign: {what}")
         version = self.version()
         if version == 0:
             raise CampaignError(f"{self.folder} holds no campaign: its creation was interrupted")

@@ -169,6 +169,8 @@ class ResultViewer(QWidget):
         column.addLayout(row)
         column.addLayout(second)
         column.addWidget(self.slope)
+        # What is left below where neither image nor curve is shown; nothing beside them.
+        column.addStretch(0)
 
     # What is shown
 
@@ -195,9 +197,12 @@ class ResultViewer(QWidget):
         self.pictures.set_scene_shown(bool(first and first.positions))
         pictured = bool(first and (first.films or first.positions))
         self.pictures.setVisible(pictured)
-        self.curves.setVisible(bool(first and (first.forces or first.positions)))
-        self._upper.setVisible(first is None or pictured or bool(_happenings(first)))
+        curved = bool(first and (first.forces or first.positions))
+        self.curves.setVisible(curved)
         self._happenings = _happenings(first) if first else ()
+        above = pictured or bool(self._happenings)
+        self._upper.setVisible(above)
+        self.split.setVisible(above or curved)
         self._fill_log()
         self._show_facts()
         self._redraw(keep=same)
@@ -252,7 +257,8 @@ class ResultViewer(QWidget):
         for each in (self.channel, self.across, self._over):
             each.setVisible(forces)
         self.fibres.setVisible(bool(first and first.films))
-        self.export.setEnabled(first is not None)
+        for shown in (self.play, self.slider, self.export):
+            shown.setVisible(first is not None)
         self.log.setVisible(bool(self._happenings))
 
     # The moment
