@@ -152,7 +152,7 @@ def test_a_folder_without_a_campaign_is_reported(tmp_path: Path) -> None:
     with pytest.raises(CampaignError, match=r"holds no campaign: there is no campaign\.sqlite"):
         CampaignStore.open(tmp_path)
     with pytest.raises(CampaignError, match="holds no campaign: it is no folder"):
-        CampaignStore.open(tmp_path / "mistyped")
+        CampaignReader(tmp_path / "mistyped").check()
     (tmp_path / "campaign.sqlite").write_bytes(b"this is no database, but long enough" * 10)
     with pytest.raises(CampaignError, match=r"campaign\.sqlite"):
         CampaignStore.open(tmp_path)
