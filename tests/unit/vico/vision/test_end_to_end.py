@@ -58,6 +58,20 @@ def test_ends_that_touch_at_an_angle_leave_a_notch() -> None:
     assert not certain(seen(dark, seed=4))
 
 
+@pytest.mark.parametrize("width", [10.0, 14.0])
+def test_a_kink_where_two_touch_is_doubted_even_where_a_blur_fills_the_notch(width: float) -> None:
+    dark = np.maximum(stretch(-260, 0.3 * width, width), stretch(0, 220, width, kink=0.3))
+    assert not certain(cv2.GaussianBlur(seen(dark, seed=6, noise=1.5), (0, 0), 1.2))
+
+
+def test_a_bow_is_no_kink() -> None:
+    line = np.array([(380 + 240 * np.sin(a), 420 - 240 * np.cos(a)) for a in np.linspace(-1, 1)])
+    big = np.zeros((SHAPE[0] * 4, SHAPE[1] * 4), np.uint8)
+    cv2.polylines(big, [np.round(line * 64).astype(np.int32)], False, 255, 40, shift=4)
+    dark = cv2.resize(big, SHAPE[::-1], interpolation=cv2.INTER_AREA) / 255.0
+    assert certain(seen(dark, seed=7)) == 1
+
+
 def test_a_root_that_thins_and_goes_on_is_not_certain() -> None:
     dark = np.maximum(stretch(-260, 0, 14), 0.5 * stretch(0, 260, 5))
     assert not certain(seen(dark, seed=5))

@@ -23,19 +23,20 @@ CERTAIN: Final = 0.999
 IMPROBABLE: Final = "weak signs together make it less than certain that it is one whole fibre"
 
 NAMES: Final = (
-    "gap", "waist", "notch", "doubled", "darkness", "width", "aside", "goes on", "soft",
+    "gap", "waist", "notch", "doubled", "darkness", "width", "aside", "swollen", "kinked",
+    "together", "goes on", "soft",
 )  # fmt: skip
-WEIGHTS: Final = (1.0, 1.0, 8.3, 4.5, 4.2, 7.6, 10.7, 3.9, 1.7)
-"""Fitted; those of gap and waist, of which a clear one is a doubt by itself, are floors."""
-FITTED_LOGIT: Final = 4.7
+WEIGHTS: Final = (2.5, 1.0, 5.6, 0.0, 1.2, 3.2, 0.0, 1.9, 7.9, 3.8, 5.0, 5.0)
+"""Fitted; that of waist, of which a clear one is a doubt by itself, is a floor."""
+FITTED_LOGIT: Final = 9.98
 """Logit of the probability where there is no sign, on images of which a half is no single fibre."""
-FITTED_ODDS: Final = 1.44
+FITTED_ODDS: Final = 1.45
 PRIOR_ODDS: Final = 99.0
 """Whole fibres for each that is two or a part, among what is found: a guess."""
 ALONE: Final = FITTED_LOGIT + log(PRIOR_ODDS / FITTED_ODDS)
 DOUBT: Final = 6.0
 """What each other reason to doubt takes off: a guess."""
-STEEPNESS: Final = 4
+STEEPNESS: Final = 2
 """A sign half as clear as one that counts by itself weighs so many powers of two less."""
 
 MOST: Final = 1.5
@@ -69,7 +70,10 @@ class Signs:
     def values(self) -> tuple[float, ...]:
         """Each sign in the order of `NAMES`, from nothing to `MOST`."""
         j = self.joints
-        along = (j.gap, j.waist, j.notch, j.doubled, j.darkness, j.width, j.aside)
+        along = (
+            j.gap, j.waist, j.notch, j.doubled, j.darkness, j.width, j.aside, j.swollen, j.kinked,
+            j.together,
+        )  # fmt: skip
         return tuple(min(max(each, 0.0), MOST) for each in (*along, self.goes_on, self.soft))
 
 

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from cosmic.frame.errors import NotAvailable
-from cosmic.vico.core.vision import certainty, checks
+from cosmic.vico.core.vision import axial, certainty, checks
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
@@ -286,6 +286,8 @@ def checked_fibres(
     for index, (strand, course) in enumerate(courses):
         signs = certainty.signs_of(scene, course, explained)
         doubts = [*strand.doubts, *checks.doubts_of(course, scene.step), *signs.doubts]
+        if not signs.joints.judged:
+            doubts.append(axial.UNJUDGED)
         if sections[index].hollow > MOST_HOLLOW:
             doubts.append(checks.PARTED)
         if touches_border(scene, course):
