@@ -1,0 +1,182 @@
+"""A read and a move over HTTP and EPICS beside the scripted API, in one run.
+
+The scripted API is measured in this process, HTTP and EPICS against a station in a process of its
+own, one after the other. A move goes 1 um there or back and is measured until the axis is at rest
+and the caller knows it: an EPICS put by design ends 80 ms after that.
+"""
+
+import logging
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+import cosmic
+from benchmarks.figures import Figure, main, percentile
+from benchmarks.network import free_ports
+
+NAME = "gateways"
+ROOT = Path(__file__).resolve().parents[1]
+AXIS = "left.x"
+POSITION = f"/api/mico/state/axes/{AXIS}/_latest/position"
+TARGETS = (10.0, 11.0)
+
+
+@dataclass(frozen=True)
+class Served:
+    """A station with both gateways."""
+
+    http: httpx.Client
+    epics_port: int
+
+
+@contextmanager
+def served() -> Iterator[Served]:
+    """Start a station in a process of its own."""
+    web, records, line = free_ports(3)
+    more = {
+        "EPICS_CA_SERVER_PORT": str(records),
+        "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "src")]),
+    }
+    command = [sys.executable, "-m", "cosmic", "serve", "--epics", "BENCH:"]
+    command += ["--http", f"127.0.0.1:{web}", "--listen", f"tcp/127.0.0.1:{line}"]
+    with tempfile.TemporaryDirectory() as folder:
+        process = subprocess.Popen(
+            command,
+            cwd=folder,
+            env=os.environ | more,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        try:
+            assert process.stdout is not None
+            found = None
+            while found is None:
+                said = process.stdout.readline()
+                assert said, "the station did not start"
+                found = re.search(r"HTTP at (\S+) \(token (\S+)\)", said)
+            assert "EPICS at" in process.stdout.readline()
+            headers = {"Authorization": f"Bearer {found[2]}"}
+            with httpx.Client(base_url=found[1], headers=headers, timeout=30.0) as http:
+                yield Served(http, records)
+        finally:
+            process.terminate()
+            process.wait(30)
+
+
+def timed_ms(action: Callable[[], object], count: int) -> list[float]:
+    """Return how long each of `count` calls took."""
+    times = []
+    for _ in range(count):
+        begun_s = time.perf_counter()
+        action()
+        times.append(1e3 * (time.perf_counter() - begun_s))
+    return times
+
+
+def scripted(reads: int, moves: int) -> tuple[list[float], list[float]]:
+    """Return the times of reads and moves of the scripted API in this process."""
+    targets = cycle(TARGETS)
+    with cosmic.connect() as rig:
+        axis = rig.mico[AXIS]
+        axis.move_to(TARGETS[1])
+        return (
+            timed_ms(lambda: axis.position_um, reads),
+            timed_ms(lambda: axis.move_to(next(targets)), moves),
+        )
+
+
+def over_http(http: httpx.Client, reads: int, moves: int) -> tuple[list[float], list[float]]:
+    """Return the times of reads and moves over HTTP."""
+    targets = cycle(TARGETS)
+
+    def move() -> None:
+        motion = {"motion": {"kind": "MoveTo", "target": next(targets), "unit": "um"}}
+        path = f"/api/mico/axes/{AXIS}/begin?wait=10"
+        http.post(path, json=motion).raise_for_status()
+
+    http.post("/api/control").raise_for_status()
+    move()
+    move()
+    moved = timed_ms(move, moves)
+    http.delete("/api/control").raise_for_status()
+    # Held below the 200 requests a second that one client may send.
+    read = []
+    for _ in range(reads):
+        read += timed_ms(lambda: http.get(POSITION).raise_for_status(), 1)
+        time.sleep(max(0.0, 0.0055 - read[-1] / 1e3))
+    return read, moved
+
+
+def over_epics(port: int, reads: int, moves: int) -> tuple[list[float], list[float]]:
+    """Return the times of reads and moves over EPICS."""
+    os.environ |= {
+        "EPICS_CA_SERVER_PORT": str(port),
+        "EPICS_CA_ADDR_LIST": "127.0.0.1",
+        "EPICS_CA_AUTO_ADDR_LIST": "NO",
+    }
+    from caproto.threading.client import Context  # it reads the environment when it is loaded
+
+    context: Any = Context()
+    place, target, control = context.get_pvs("BENCH:left_x.RBV", "BENCH:left_x", "BENCH:control")
+    for each in (place, target, control):
+        each.wait_for_connection(timeout=30)
+    targets = cycle(TARGETS)
+
+    def move() -> None:
+        done = target.write([next(targets)], wait=True, timeout=30)
+        assert done.status.success, done
+
+    control.write([1], wait=True, timeout=30)
+    move()
+    move()
+    moved = timed_ms(move, moves)
+    read = timed_ms(lambda: place.read(timeout=30), reads)
+    control.write([0], wait=True, timeout=30)
+    context.disconnect()
+    return read, moved
+
+
+def measure(quick: bool = False) -> list[Figure]:
+    """Return the figures of one run."""
+    logging.getLogger("cosmic").setLevel(logging.ERROR)
+    reads, moves = (20, 3) if quick else (1000, 60)
+    own_read, own_moved = scripted(reads, moves)
+    figures = [
+        Figure(NAME, "scripted API: read, p50", 1e3 * percentile(own_read, 50), "us"),
+        Figure(NAME, "scripted API: move of 1 um, p50", percentile(own_moved, 50), "ms"),
+    ]
+    with served() as station:
+        found = {
+            "HTTP": over_http(station.http, reads, moves),
+            "EPICS": over_epics(station.epics_port, reads, moves),
+        }
+    for door, (read, moved) in found.items():
+        figures += [
+            Figure(NAME, f"{door}: read, p50", percentile(read, 50), "ms"),
+            Figure(NAME, f"{door}: read, p99", percentile(read, 99), "ms"),
+            Figure(NAME, f"{door}: read to scripted, p50", _ratio(read, own_read), ""),
+            Figure(NAME, f"{door}: move of 1 um, p50", percentile(moved, 50), "ms"),
+            Figure(NAME, f"{door}: move of 1 um, p99", percentile(moved, 99), "ms"),
+            Figure(NAME, f"{door}: move to scripted, p50", _ratio(moved, own_moved), ""),
+        ]
+    return figures
+
+
+def _ratio(of: list[float], to: list[float]) -> float:
+    return percentile(of, 50) / percentile(to, 50)
+
+
+if __name__ == "__main__":
+    main(__doc__, measure)
