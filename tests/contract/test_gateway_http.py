@@ -19,6 +19,7 @@ from contract.station_rig import free_port, wait_until
 from cosmic.app.configuration.gateways import HttpClient, HttpSettings, doors
 from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.http import BODY_LIMIT_BYTES, HttpGateway
+from cosmic.app.gateways.http_server import listening
 from cosmic.app.gateways.openapi import mcp_tools
 from cosmic.app.panels.approvals import ApprovalsPanel
 from cosmic.frame.errors import ConfigError
@@ -338,6 +339,15 @@ def test_raw_bytes_that_are_no_http_harm_nobody(door: Door) -> None:
     with door.client("view") as http:
         assert http.get("/api/station").json()["you"] == "view"
     assert not door.failures
+
+
+def test_answers_are_sent_without_waiting_for_an_acknowledgement() -> None:
+    with listening(HttpSettings(listen=f"127.0.0.1:{free_port()}")) as bound:
+        with socket.create_connection(bound.getsockname()):
+            came, _ = bound.accept()
+        with came:
+            # asyncio turns Nagle's delay off for what says that it is TCP, and for nothing else.
+            assert came.proto == socket.IPPROTO_TCP
 
 
 def test_the_page_and_the_description_need_no_token(door: Door) -> None:
