@@ -285,9 +285,20 @@ class OneSpan:
     def _back(self, contact_um: float) -> Steps:
         push = self._push
         top, end = self._points.way_um[-1], contact_um - push.retreat_um / 2.0
-        for travel in places_back_um(top, contact_um, end, push.steps_back):
+        for travel in places_back_um(top, self._met_um(contact_um), end, push.steps_back):
             yield from self._to(travel, push.average_s, loading=False)
         yield from self._to(contact_um - push.retreat_um, push.average_s, loading=False)
+
+    def _met_um(self, free_um: float) -> float:
+        """Return about where the fibre was met, beyond where the probe was still free of it."""
+        base, ways = self._fibre.zero_un or 0.0, np.array(self._points.way_um)
+        forces = np.array(self._points.force_un) - base
+        first = int(np.argmax(ways > free_um))
+        rise = float(forces[-1] - forces[first])
+        if rise <= 0.0:
+            return free_um
+        met = ways[first] - forces[first] * (ways[-1] - ways[first]) / rise
+        return float(min(max(met, free_um), ways[first]))
 
     def _keep(self) -> None:
         work, points = self._work, self._points
@@ -318,16 +329,16 @@ LEAST_BACK: Final = 5
 LEAST_FREE: Final = 2
 
 
-def places_back_um(top_um: float, contact_um: float, end_um: float, steps: int) -> list[float]:
+def places_back_um(top_um: float, met_um: float, end_um: float, steps: int) -> list[float]:
     """Return where the force is read on the way back: evenly, but enough of it on the fibre.
 
     A stiff or short span is pushed by a micrometre or two. In steps laid out over the whole way
     the fibre would be left within one of them, and nothing would be known of the way back.
     """
-    pressed = max(round(steps * (top_um - contact_um) / (top_um - end_um)), LEAST_BACK)
+    pressed = max(round(steps * (top_um - met_um) / (top_um - end_um)), LEAST_BACK)
     free = max(steps - pressed, LEAST_FREE)
-    on_it = np.linspace(top_um, contact_um, pressed + 1)[1:]
-    return [*on_it.tolist(), *np.linspace(contact_um, end_um, free + 1)[1:].tolist()]
+    on_it = np.linspace(top_um, met_um, pressed + 1)[1:]
+    return [*on_it.tolist(), *np.linspace(met_um, end_um, free + 1)[1:].tolist()]
 
 
 TOO_SHORT: Final = "too short"

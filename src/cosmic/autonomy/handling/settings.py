@@ -174,7 +174,7 @@ class PushSettings(StrictModel):
     search_average_s : float
         The same while the fibre is looked for.
     steps_out, steps_back : int
-        Steps of one push.
+        Steps of one push; the way back of a short stroke has a few more.
     dwell_s, dwell_looks : float, int
         How long the probe stays where it pushed farthest, and how often the force is read
         meanwhile: it shows how the fibre relaxes.

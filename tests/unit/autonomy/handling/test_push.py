@@ -202,6 +202,17 @@ def test_a_soft_fibre_gets_shorter_spans_once_the_first_has_shown_it():
     assert nominal[0] > 1.5 * nominal[1]
 
 
+@pytest.mark.parametrize("ei_n_m2", [5e-11, 4e-10])
+def test_each_span_is_read_on_the_fibre_both_ways(ei_n_m2: float):
+    bench = Bench(ei_n_m2)
+    carried_out(PushSpans().run(bench))
+    for span in bench.held_fibre().spans:
+        height = span.force_un - span.force_un[0]
+        back = height[~span.loading]
+        assert np.sum(back > 0.05 * height.max()) >= 3, span.nominal_um
+        assert np.sum(back < 0.05 * height.max()) >= 3, "and where it is left"
+
+
 def test_a_limit_that_was_armed_before_is_as_it_was_after_the_push():
     bench = Bench(5e-11)
     mine = LimitSettings(channel="force", low=-150.0, high=150.0, hysteresis=5.0, armed=True)
