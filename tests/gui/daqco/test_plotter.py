@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QWheelEvent
+from PySide6.QtGui import QFontMetricsF, QWheelEvent
 from PySide6.QtWidgets import QApplication
 
 from cosmic.daqco.core.settings import LimitSettings
@@ -418,3 +418,17 @@ def test_values_that_are_not_measured_any_more_are_grey_with_their_age(qtbot, po
     plotter.read_out()
     assert plotter.state.text() == "LIVE"
     assert model.data(model.index(0, 1), Qt.ItemDataRole.ForegroundRole) is None
+
+
+@pytest.mark.parametrize("height_px", [130, 170, 240, 500])
+def test_the_numbers_of_a_low_chart_do_not_touch(plotter, qtbot, port, height_px):
+    plotter.resize(900, height_px)
+    qtbot.wait(100)
+    chart = plotter.chart
+    (unit,) = chart.axes.units[:1]
+    chart.set_ranges({each: AxisRange(0.5, 4.0, 0.5) for each in chart.axes.units})
+    axis = chart.axes.axis(unit)
+    height = chart.box.height()
+    ((_, values), *_) = axis.tickValues(0.5, 4.0, height)
+    apart_px = np.diff(values) * height / 3.5
+    assert (apart_px >= QFontMetricsF(axis.style["tickFont"]).height()).all()

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QFont, QPainter, QPen
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
 from PySide6.QtWidgets import (
     QGraphicsItem,
     QGraphicsSceneWheelEvent,
@@ -160,6 +160,8 @@ AXIS_PX: Final = 60
 _BELOW_PX: Final = 36
 _MOST: Final = 20
 _GAP_PX: Final = 4
+_COARSER: Final = (1.0, 2.0, 4.0, 5.0, 10.0)
+"""So much further apart may numbers stand than asked for, where the chart is low."""
 
 
 class Axes:
@@ -173,6 +175,7 @@ class Axes:
         self.time.linkToView(box)
         self.time.setHeight(_BELOW_PX)
         self._values: dict[str, pg.AxisItem] = {}
+        self._shown: dict[str, AxisRange] = {}
         self._names: list[pg.LabelItem] = []
         layout.addItem(box, row=1, col=_MOST)
         layout.addItem(self.time, row=2, col=_MOST)
@@ -180,6 +183,7 @@ class Axes:
         layout.layout.setSpacing(_GAP_PX)
         layout.layout.setContentsMargins(4, 2, 12, 2)
         self._style(self.time)
+        box.sigResized.connect(self._space)
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -197,7 +201,17 @@ class Axes:
         for unit, shown in ranges.items():
             axis = self._values[unit]
             axis.setRange(shown.low, shown.high)
-            axis.setTickSpacing(levels=[(shown.step, 0.0)])
+        self._shown = dict(ranges)
+        self._space()
+
+    def _space(self, *_: object) -> None:
+        """Set the numbers apart as far as asked for, or further, so that none touches the next."""
+        line_px = QFontMetricsF(self._font).height()
+        for unit, shown in self._shown.items():
+            step_px = self._box.height() * shown.step / (shown.high - shown.low)
+            fitting = [each for each in _COARSER if each * step_px >= line_px]
+            step = shown.step * (fitting[0] if fitting else _COARSER[-1])
+            self._values[unit].setTickSpacing(levels=[(step, 0.0)])
 
     def restyle(self) -> None:
         """Take over the colours of the theme in force."""
@@ -215,6 +229,7 @@ class Axes:
         return tuple((value - low) / (high - low) for value in major)
 
     def _rebuild(self, units: tuple[str, ...]) -> None:
+        self._shown = {}
         for item in (*self._values.values(), *self._names):
             self._layout.removeItem(item)
             item.deleteLater()
