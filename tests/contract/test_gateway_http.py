@@ -2,10 +2,12 @@
 
 import json
 import socket
+import ssl
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -24,7 +26,9 @@ from cosmic.app.gateways.openapi import mcp_tools
 from cosmic.app.panels.approvals import ApprovalsPanel
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import Failure, FailurePolicy
+from cosmic.frame.network.certificates import make_certificates
 from cosmic.frame.network.host import Host
+from cosmic.frame.network.line_settings import Certificates
 from cosmic.frame.network.station import Station
 
 TOKENS = {"move": "m" * 20, "call": "c" * 20, "view": "v" * 20}
@@ -50,7 +54,11 @@ class Door:
 
 
 @contextmanager
-def opened(kind: type[Cabinet] = Cabinet, approvals: Approvals | None = None) -> Iterator[Door]:
+def opened(
+    kind: type[Cabinet] = Cabinet,
+    approvals: Approvals | None = None,
+    certificates: Certificates | None = None,
+) -> Iterator[Door]:
     home, policy = kind(), FailurePolicy()
     failures: list[Failure] = []
     policy.subscribe(failures.append)
@@ -63,6 +71,9 @@ def opened(kind: type[Cabinet] = Cabinet, approvals: Approvals | None = None) ->
     )
     asks = approvals is not None
     settings = HttpSettings(listen=f"127.0.0.1:{free_port()}", client=clients, approve=asks)
+    if certificates is not None:
+        files = {"certificate": str(certificates.certificate), "key": str(certificates.key)}
+        settings = settings.model_copy(update=files)
     hosts, ask = {"cabinet": host}, None
     if approvals is not None:
         hosts["approvals"] = Host("approvals", approvals)
@@ -339,6 +350,32 @@ def test_raw_bytes_that_are_no_http_harm_nobody(door: Door) -> None:
     with door.client("view") as http:
         assert http.get("/api/station").json()["you"] == "view"
     assert not door.failures
+
+
+def test_commands_and_events_pass_over_tls_and_nothing_else_does(tmp_path: Path) -> None:
+    own = make_certificates(tmp_path / "own", "fibres")["fibres"]
+    other = make_certificates(tmp_path / "other", "fibres")["fibres"]
+    trusting = ssl.create_default_context(cafile=str(own.authority))
+    strange = ssl.create_default_context(cafile=str(other.authority))
+    with opened(certificates=own) as door:
+        assert door.address.startswith("https://")
+        line = door.address.replace("https", "wss") + "/api/events"
+        with (
+            door.client(verify=trusting) as http,
+            connect(line, ssl=trusting, proxy=None) as events,
+        ):
+            events.send(json.dumps({"token": TOKENS["move"], "follow": []}))
+            assert json.loads(events.recv(5.0))["payload"] == "move"
+            assert http.post("/api/control").json()["in_control"]
+            path = "/api/cabinet/drawers/left.x/move"
+            assert http.post(path, json={"target_um": 5.0}).json() == {"result": 5.0}
+        with door.client(verify=strange) as http, pytest.raises(httpx.ConnectError):
+            http.get("/api/station")
+        plain = door.address.replace("https", "http")
+        with pytest.raises(httpx.TransportError):
+            httpx.get(f"{plain}/api/station")
+        assert door.home.drawers["left.x"].moved_um == [5.0]
+        assert not door.failures
 
 
 def test_answers_are_sent_without_waiting_for_an_acknowledgement() -> None:
