@@ -27,7 +27,7 @@ from cosmic.vico.core.vision.smoothing import arc_lengths, directions, resampled
 
 GAP = "the ground shines through in one place: it may be two fibres end to end"
 DOUBLED = "a stretch of it is denser than the rest: two fibres may overlap there"
-UNJUDGED = "too short a stretch of it is seen to tell one fibre from two"
+UNCHECKED = "too short a stretch of it is seen to tell one fibre from two"
 STEP = "its width, contrast or course changes in one step: it may be two fibres end to end"
 
 # Standard deviations of the fibre's own unevenness.
@@ -68,7 +68,7 @@ class Joints:
         It turns more within a width than before and after.
     together : float
         All of these in one place.
-    judged : bool
+    checked : bool
         Whether enough of it is seen to tell.
     """
 
@@ -82,7 +82,7 @@ class Joints:
     swollen: float = 0.0
     kinked: float = 0.0
     together: float = 0.0
-    judged: bool = True
+    checked: bool = True
 
     @property
     def doubts(self) -> list[str]:
@@ -103,7 +103,7 @@ def joints(scene: Scene, course: Course) -> Joints:
     # Where the ground shines through, no edges are seen.
     free = _seen(course, course.free, line, blur)
     if seen.sum() < 6.0 * course.width:
-        return Joints(judged=False)
+        return Joints(checked=False)
     height, across = _heights(scene, course, line, blur)
     inner = height[:, np.abs(across) <= 0.3 * course.width].mean(axis=1).astype(np.float64)
     typical = middle(inner[seen])

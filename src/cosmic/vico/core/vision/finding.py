@@ -286,8 +286,8 @@ def checked_fibres(
     for index, (strand, course) in enumerate(courses):
         signs = certainty.signs_of(scene, course, explained)
         doubts = [*strand.doubts, *checks.doubts_of(course, scene.step), *signs.doubts]
-        if not signs.joints.judged:
-            doubts.append(axial.UNJUDGED)
+        if not signs.joints.checked:
+            doubts.append(axial.UNCHECKED)
         if sections[index].hollow > MOST_HOLLOW:
             doubts.append(checks.PARTED)
         if touches_border(scene, course):
