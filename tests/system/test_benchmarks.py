@@ -63,7 +63,7 @@ def test_each_section_of_figures_names_commands_that_exist_and_when_it_was_measu
             assert name in {*ALL, "run", "guard"}, f"{title}: there is no benchmark {name}"
             sources = [repository / "benchmarks" / f"{each}.py" for each in (name, "figures")]
             offered = "".join(each.read_text(encoding="utf-8") for each in sources)
-            for option in re.findall(r"--\w+", options):
+            for option in re.findall(r"--[\w-]+", options):
                 assert f'"{option}"' in offered, f"{title}: {name} has no {option}"
         if "\n|" in text:
             assert re.search(r"\b20\d\d-\d\d-\d\d\b", text), f"{title}: when?"
