@@ -145,7 +145,7 @@ class Rig:
 
         if self._handling is not None and self._handling.running:
             raise NotAvailable("an operation on a fibre is running; wait until it has ended")
-        if self._running() == A_CAMPAIGN:
+        if self.running == A_CAMPAIGN:
             raise NotAvailable("a campaign is running; end it first")
         campaign = campaign_on(self, self._platform, recipe, folder)
         self._runs.add(campaign)
@@ -213,7 +213,7 @@ class Rig:
         if self._handling is None:
             from cosmic.autonomy.shipped.fibre_handling import FibreHandling
 
-            self._handling = FibreHandling(self, self.procedure, self._running)
+            self._handling = FibreHandling(self, self.procedure, lambda: self.running)
         return self._handling
 
     def replay(
@@ -257,8 +257,11 @@ class Rig:
         around = Surroundings(marked, folder=lambda: Path(folder))
         return replay_on(self.handling, procedure, around)
 
-    def _running(self) -> str:
-        """Return which campaign or procedure runs, in words; empty for none."""
+    @property
+    def running(self) -> str:
+        """Which campaign or procedure runs here, in words; empty for none."""
+        if not self._runs:
+            return ""
         from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 
         for each in list(self._runs):

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.campaign.dock import CAMPAIGN
@@ -92,7 +93,13 @@ def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
     def moves(campaign: Campaign) -> bool:
         return any(each.axis.details.in_motion for each in cards) or campaign.over
 
+    coach = window.findChild(QWidget, "coach")
+    assert coach is not None
+    words = coach.findChild(QLabel)
+    assert words is not None
     qtbot.waitUntil(lambda: moves(campaign), timeout=30_000)
+    # Between pushes its force limit is disarmed on purpose: nobody is to arm it meanwhile.
+    qtbot.waitUntil(lambda: words.text().startswith("A campaign runs"), timeout=10_000)
     window.stop("a hand on the button")
     qtbot.waitUntil(lambda: campaign.over, timeout=30_000)
     panel = panel_of(window, qtbot)

@@ -6,7 +6,7 @@ from typing import Protocol
 from cosmic.app.panels.coach import Rule, Step
 from cosmic.app.panels.force import ForcePanel
 from cosmic.app.panels.tool import ToolPanel
-from cosmic.app.rig import Rig
+from cosmic.app.rig import A_CAMPAIGN, Rig
 from cosmic.app.windows.fibre_menu import FibreOperations
 from cosmic.app.windows.stage import Stage
 from cosmic.daqco.core.settings import LimitSettings
@@ -32,8 +32,14 @@ def coach_rules(
 ) -> tuple[Rule, ...]:
     """Return the rules of a window: trouble first, then what is missing, then the task in hand."""
     rules = _Rules(window, rig, gui, parts)
-    first = (rules.not_ready, rules.stopped, rules.limit_crossed, rules.position_unknown)
-    missing = (rules.lens_unknown, rules.camera_stopped, rules.nothing_acquired, rules.disarmed)
+    first = (rules.not_ready, rules.stopped, rules.limit_crossed, rules.campaign)
+    missing = (
+        rules.position_unknown,
+        rules.lens_unknown,
+        rules.camera_stopped,
+        rules.nothing_acquired,
+        rules.disarmed,
+    )
     return (*first, *missing, rules.fibre, rules.task)
 
 
@@ -94,6 +100,13 @@ class _Rules:
         named = unknown[0] if len(unknown) == 1 else f"{len(unknown)} axes"
         text = f"The position of {named} is unknown. Initialise finds the references."
         return Step(text, "Initialise", self._gui.initialise)
+
+    def campaign(self) -> Step | None:
+        """Look whether a campaign works: what seems to be missing then is its own business."""
+        if self._rig.running != A_CAMPAIGN:
+            return None
+        text = "A campaign runs. It arms the force limit itself while the probe pushes. "
+        return Step(text + "Abort leaves things safe; STOP stops at once.")
 
     def lens_unknown(self) -> Step | None:
         """Look at the lens."""

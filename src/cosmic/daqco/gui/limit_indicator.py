@@ -58,10 +58,11 @@ def short_text(limit: DaqLimit, value: float | None) -> str:
     low, high = given.low, given.high
     nearer_low = high is None or (value is not None and low is not None and value < 0.0)
     side = low if nearer_low else high
-    word = "STOPPED" if limit.crossed else "ARMED" if given.armed else "DISARMED"
     now = "–" if value is None else f"{value:.1f}"
+    if not (limit.crossed or given.armed):  # no bound, then: the bar is as wide as with one
+        return f"{given.channel} {now} DISARMED"
     bound = "–" if side is None else f"{side:g}"
-    return f"{given.channel} {now}/{bound} {word}"
+    return f"{given.channel} {now}/{bound} {'STOPPED' if limit.crossed else 'ARMED'}"
 
 
 class LimitIndicator(Chip):
