@@ -7,9 +7,6 @@ and the caller knows it: an EPICS put by design ends 80 ms after that.
 
 import logging
 import os
-import re
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -20,13 +17,13 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+from tests.system.served_program import served_program
 
 import cosmic
 from benchmarks.figures import Figure, main, percentile
 from benchmarks.network import free_ports
 
 NAME = "gateways"
-ROOT = Path(__file__).resolve().parents[1]
 AXIS = "left.x"
 POSITION = f"/api/mico/state/axes/{AXIS}/_latest/position"
 TARGETS = (10.0, 11.0)
@@ -44,35 +41,12 @@ class Served:
 def served() -> Iterator[Served]:
     """Start a station in a process of its own."""
     web, records, line = free_ports(3)
-    more = {
-        "EPICS_CA_SERVER_PORT": str(records),
-        "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "src")]),
-    }
-    command = [sys.executable, "-m", "cosmic", "serve", "--epics", "BENCH:"]
-    command += ["--http", f"127.0.0.1:{web}", "--listen", f"tcp/127.0.0.1:{line}"]
-    with tempfile.TemporaryDirectory() as folder:
-        process = subprocess.Popen(
-            command,
-            cwd=folder,
-            env=os.environ | more,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
-        try:
-            assert process.stdout is not None
-            found = None
-            while found is None:
-                said = process.stdout.readline()
-                assert said, "the station did not start"
-                found = re.search(r"HTTP at (\S+) \(token (\S+)\)", said)
-            assert "EPICS at" in process.stdout.readline()
-            headers = {"Authorization": f"Bearer {found[2]}"}
-            with httpx.Client(base_url=found[1], headers=headers, timeout=30.0) as http:
-                yield Served(http, records)
-        finally:
-            process.terminate()
-            process.wait(30)
+    more = {"EPICS_CA_SERVER_PORT": str(records)}
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        served_program(Path(folder), web, line, "--epics", "BENCH:", variables=more) as program,
+    ):
+        yield Served(program.http, records)
 
 
 def timed_ms(action: Callable[[], object], count: int) -> list[float]:

@@ -51,6 +51,17 @@ html = false
 pdf = false
 table = false
 """
+TRANSPORT: Final = """
+procedure = "transport"
+[stop]
+good = 1
+time_s = 1800.0
+[output]
+html = false
+pdf = false
+table = false
+"""
+"""A recipe of one fibre that is only carried: the shortest campaign there is."""
 GRACE_WALL_S: Final = 0.3
 """How long after a stop, on a busy machine, an axis may take to stand."""
 CREEP_UM: Final = 0.05

@@ -19,17 +19,7 @@ from cosmic.autonomy.campaign.campaign import CampaignPhase
 from cosmic.frame.clock import RatedClock
 from cosmic.frame.errors import MoveRefused
 from cosmic.twin.scene import Scene
-
-RECIPE = """
-procedure = "transport"
-[stop]
-good = 1
-time_s = 1800.0
-[output]
-html = false
-pdf = false
-table = false
-"""
+from system.campaign_bench import TRANSPORT
 
 
 class OneWorld:
@@ -85,7 +75,7 @@ def test_cameras_here_know_where_the_axes_of_the_station_are(rig: Rig) -> None:
 
 def test_nothing_is_handled_before_the_control_was_taken(rig: Rig, tmp_path: Path) -> None:
     recipe = tmp_path / "transport.toml"
-    recipe.write_text(RECIPE, encoding="utf-8")
+    recipe.write_text(TRANSPORT, encoding="utf-8")
     campaign = rig.campaign(recipe, tmp_path / "out")
     before = rig.mico["left.z"].position_um
     campaign.run_here()
@@ -100,7 +90,7 @@ def test_nothing_is_handled_before_the_control_was_taken(rig: Rig, tmp_path: Pat
 @pytest.mark.timeout(1200)
 def test_a_fibre_is_handled_with_the_axes_of_a_station(rig: Rig, tmp_path: Path) -> None:
     recipe = tmp_path / "transport.toml"
-    recipe.write_text(RECIPE, encoding="utf-8")
+    recipe.write_text(TRANSPORT, encoding="utf-8")
     rig.take_control()
     campaign = rig.campaign(recipe, tmp_path / "out")
     campaign.run_here()

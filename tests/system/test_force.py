@@ -1,6 +1,7 @@
 """The whole simulated platform: the probe pushes a fibre, the force is seen, kept and guarded."""
 
 import math
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from shutil import copytree
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import cosmic
+from cosmic.daqco.core.recording_file import RecordingFile
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.config import shipped_config_dir
 from unit.mico.rigs import wait_until
@@ -242,3 +244,32 @@ def test_the_shortest_recording_says_where_the_axes_were(rig: cosmic.Rig, tmp_pa
             times, where, _ = recording.positions("probe.y")
             assert len(times) > 0
             assert np.isfinite(where).all()
+
+
+def test_a_recording_is_active_until_its_file_is_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    closing, go_on = threading.Event(), threading.Event()
+    close = RecordingFile.close
+
+    def slow(file: RecordingFile, *, complete: bool) -> None:
+        closing.set()
+        assert go_on.wait(10.0)
+        close(file, complete=complete)
+
+    monkeypatch.setattr(RecordingFile, "close", slow)
+    with cosmic.connect(applications=("daqco",)) as rig:
+        rig.daqco.start()
+        rig.daqco.start_recording(tmp_path / "push.h5")
+        stopping = threading.Thread(target=rig.daqco.stop_recording)
+        stopping.start()
+        try:
+            assert closing.wait(10.0)
+            state = rig.daqco.recording
+            assert (state.active, state.path) == (True, tmp_path / "push.h5")
+        finally:
+            go_on.set()
+            stopping.join()
+        assert not rig.daqco.recording.active
+    with cosmic.open_recording(tmp_path / "push.h5") as found:
+        assert found.complete

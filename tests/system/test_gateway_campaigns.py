@@ -1,9 +1,6 @@
 """A campaign over HTTP on the simulated platform: started, watched, paused, carried out, ended."""
 
 import json
-import re
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,18 +13,10 @@ import pytest
 from websockets.sync.client import connect
 
 from contract.station_rig import free_port, wait_until
+from system.campaign_bench import TRANSPORT
+from system.served_program import served_program
 
 pytestmark = pytest.mark.slow
-RECIPE = """
-procedure = "transport"
-[stop]
-good = 1
-time_s = 1800.0
-[output]
-html = false
-pdf = false
-table = false
-"""
 
 
 @dataclass
@@ -55,25 +44,10 @@ class Served:
 def served(tmp_path: Path) -> Iterator[Served]:
     """A station in a process of its own, so that what it computes silences no client here."""
     (tmp_path / "campaigns").mkdir()
-    (tmp_path / "campaigns" / "one.toml").write_text(RECIPE, encoding="utf-8")
-    command = [sys.executable, "-m", "cosmic", "serve", "--rate", "8", "--sample", "three-dry"]
-    command += ["--http", f"127.0.0.1:{free_port()}", "--listen", f"tcp/127.0.0.1:{free_port()}"]
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=tmp_path
-    )
-    try:
-        assert process.stdout is not None
-        found = None
-        while found is None:
-            line = process.stdout.readline()
-            assert line, "the station did not start"
-            found = re.search(r"HTTP at (\S+) \(token (\S+)\)", line)
-        headers = {"Authorization": f"Bearer {found[2]}"}
-        with httpx.Client(base_url=found[1], headers=headers, timeout=90.0) as http:
-            yield Served(http, found[2])
-    finally:
-        process.terminate()
-        process.communicate(timeout=60)
+    (tmp_path / "campaigns" / "one.toml").write_text(TRANSPORT, encoding="utf-8")
+    options = ("--rate", "8", "--sample", "three-dry")
+    with served_program(tmp_path, free_port(), free_port(), *options) as program:
+        yield Served(program.http, program.token)
 
 
 @pytest.mark.timeout(300)

@@ -4,7 +4,6 @@ import io
 import json
 import os
 import random
-import re
 import socket
 import subprocess
 import sys
@@ -21,6 +20,7 @@ import tifffile
 
 from contract.station_rig import free_port, wait_until
 from system.docs_blocks import ROOT, blocks
+from system.served_program import served_program
 
 pytestmark = pytest.mark.slow
 TUTORIALS: Final = ROOT / "docs" / "tutorials"
@@ -40,31 +40,10 @@ class Served:
 def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     port, web = port_for_searches(), free_port()
     folder = tmp_path_factory.mktemp("served")
-    own = {f"XDG_{each}_HOME": str(folder) for each in ("CONFIG", "DATA", "STATE")}
-    command = [sys.executable, "-m", "cosmic", "serve", "--epics", "COSMIC:"]
-    command += ["--http", f"127.0.0.1:{web}", "--listen", f"tcp/127.0.0.1:{free_port()}"]
-    process = subprocess.Popen(
-        command,
-        env=os.environ | own | {"EPICS_CA_SERVER_PORT": str(port)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        cwd=folder,
-    )
-    try:
-        assert process.stdout is not None
-        found = None
-        while found is None:
-            line = process.stdout.readline()
-            assert line, "the station did not start"
-            found = re.search(r"HTTP at (\S+) \(token (\S+)\)", line)
-        assert "EPICS at port" in process.stdout.readline()
-        headers = {"Authorization": f"Bearer {found[2]}"}
-        with httpx.Client(base_url=found[1], headers=headers, timeout=30.0) as http:
-            yield Served(http, port, found[2])
-    finally:
-        process.terminate()
-        process.communicate(timeout=30)
+    more = {"EPICS_CA_SERVER_PORT": str(port)}
+    options = ("--epics", "COSMIC:")
+    with served_program(folder, web, free_port(), *options, variables=more) as program:
+        yield Served(program.http, port, program.token)
 
 
 @pytest.fixture

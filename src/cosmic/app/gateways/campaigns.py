@@ -262,15 +262,18 @@ class Campaigns(Declared):
         self.note_change()
 
     def _carry_out(self, campaign: "Campaign", task: Task) -> None:
+        failure: CosmicError | None = OperationCancelled("a defect ended it; the log names it")
         try:
             campaign.run_here()
+            failure = OperationCancelled(campaign.end_reason) if campaign.unfinished else None
         except CosmicError as exc:  # it was ended before it began
-            task.fail(exc)
-        if campaign.unfinished:
-            task.fail(OperationCancelled(campaign.end_reason))
-        else:
-            task.finish()
-        self.note_change()
+            failure = exc
+        finally:
+            if failure is None:
+                task.finish()
+            else:
+                task.fail(failure)
+            self.note_change()
 
 
 def _checked(folder: str) -> str:

@@ -43,7 +43,7 @@ def hidden(work: HandlingContext, approach: Reach) -> bool:
 
 
 def over(work: HandlingContext) -> bool:
-    """Return whether an arm begins no further fibre in this round."""
+    """Return whether an arm begins no further fibre in this round; if it does, that is noted."""
     shared, again = work.shared, work.settings.re_survey
     shared.seeking.discard(work.settings.gripper)
     if shared.enough() or not shared.surveyed or stands_aside(work):

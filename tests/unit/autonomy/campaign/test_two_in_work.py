@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cosmic.autonomy.campaign.campaign import Campaign, Treatment
+from cosmic.autonomy.campaign.recipe import load_recipe
 from cosmic.autonomy.campaign.recorder import FibreRecorder
 from cosmic.autonomy.campaign.records import Outcome
 from cosmic.autonomy.campaign.resume import resume
@@ -16,10 +18,14 @@ from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.handling.context import Calibration, HandlingContext
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Reach
+from cosmic.autonomy.handling.prepare import MakeReady
 from cosmic.autonomy.handling.settings import HandlingSettings, of_arm
+from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState
 from cosmic.frame.clock import ManualClock
+from cosmic.frame.failure import FailurePolicy
 from unit.autonomy.campaign.sample_records import INFO
+from unit.autonomy.campaign.test_recipe import Parameters
 
 
 class Force:
@@ -169,3 +175,19 @@ def test_a_fibre_is_kept_once(desk: Desk) -> None:
     desk.does("left", "choose a fibre")
     assert desk.recorder.in_work == ()
     assert len(desk.store.reader.fibres()) == 1
+
+
+def test_an_arm_that_has_begun_counts_as_one_more_before_it_has_chosen(
+    desk: Desk, tmp_path: Path
+) -> None:
+    (tmp_path / "two.toml").write_text('procedure = "bend test"\n[stop]\ngood = 2\n')
+    recipe = load_recipe(tmp_path / "two.toml", procedures={"bend test": Parameters})
+    treatment = Treatment(Procedure("bend test", MakeReady()), measures=False)
+    Campaign(desk.work, treatment, recipe, desk.store, policy=FailurePolicy(), stopped=lambda: None)
+    shared = desk.work.shared
+    shared.seeking.add("left")
+    assert not shared.enough()
+    shared.seeking.add("right")
+    assert shared.enough(), "two are wanted, and two are at work"
+    shared.seeking.discard("right")
+    assert not shared.enough()

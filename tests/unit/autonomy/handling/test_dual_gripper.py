@@ -177,6 +177,21 @@ def test_an_arm_begins_no_further_fibre_once_it_is_enough_or_the_plate_must_be_s
         chosen(left)
 
 
+def test_an_arm_counts_from_when_it_begins_until_its_fibre_is_done_with() -> None:
+    left, right = arms(straight(-2000.0, -900.0), straight(2000.0, -2000.0))
+    # One fibre is wanted: who has begun with one, though it waits for the plate, is enough.
+    left.shared.enough = lambda: bool(left.shared.seeking)
+    assert not over(left)
+    assert over(right)
+    fibre = chosen(left)
+    assert over(right)
+    left.shared.done_with(fibre)
+    assert left.shared.finished == [fibre]
+    assert not over(right), "it did not become a good one, say"
+    assert over(left)
+    assert not over(right), "its own beginning does not keep an arm from going on"
+
+
 def test_an_arm_that_cannot_put_away_three_in_a_row_stands_aside_and_the_other_goes_on() -> None:
     left, right = arms(*(straight(-2000.0, y_um) for y_um in (-900.0, -1800.0, -2700.0)))
     for _ in range(SETTINGS.pair.stuck):
