@@ -94,13 +94,21 @@ def _draw_contact(painter: QPainter, pair: Pair, project: Project, palette: Pale
 def draw_plate(
     painter: QPainter, place: QPointF, text: str, palette: Palette, edge: QColor
 ) -> None:
-    """Write `text` on a ground of its own, its top left corner at `place`, kept in the picture."""
+    """Write `text` on a ground of its own, its top left corner at `place`, kept in the picture.
+
+    Where there is no room for all of it nothing is written: a part of a number is another number.
+    """
     if not QRectF(painter.window()).adjusted(-40, -40, 40, 40).contains(place):
         return  # what it is about is out of sight
     painter.setFont(number_font(_SMALL_PX, bold=True))
     metrics = QFontMetricsF(painter.font())
     box = QRectF(place.x(), place.y(), metrics.horizontalAdvance(text) + 12, metrics.height() + 4)
-    room = QRectF(painter.window()).adjusted(2, 2, -2, -2)
+    room = QRectF(painter.window())
+    if painter.hasClipping():
+        room &= painter.clipBoundingRect()
+    room.adjust(2, 2, -2, -2)
+    if box.width() > room.width() or box.height() > room.height():
+        return
     box.moveLeft(max(room.left(), min(box.left(), room.right() - box.width())))
     box.moveTop(max(room.top(), min(box.top(), room.bottom() - box.height())))
     ground = QColor(palette.raised)
