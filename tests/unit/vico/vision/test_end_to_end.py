@@ -64,7 +64,7 @@ def test_a_kink_where_two_touch_is_doubted_even_where_a_blur_fills_the_notch(wid
     assert not certain(cv2.GaussianBlur(seen(dark, seed=6, noise=1.5), (0, 0), 1.2))
 
 
-def test_what_is_too_short_to_tell_is_not_certain() -> None:
+def test_a_fibre_too_short_to_check_is_not_certain() -> None:
     (found,) = find_fibres(seen(stretch(-40, 40, 14), seed=8))
     assert not found.certain
     assert "too short" in found.doubts[0]
