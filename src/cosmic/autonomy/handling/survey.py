@@ -20,6 +20,7 @@ from cosmic.vico.core.pixel_map import Floats
 
 CROSSING = "crossing"
 NOT_CERTAIN = "not certain"
+TOO_FAINT = "too faint"
 TOO_SHORT = "too short"
 TOO_LONG = "too long"
 TOO_CURLED = "too curled"
@@ -68,9 +69,13 @@ def none_left(skip_reasons: Mapping[str, int]) -> str:
     skip_reasons : mapping of str to int
         Why fibres on the plate are not taken, and how many.
     """
+    empty = "the plate is empty: put a sample there, or check light and focus"
+    if not skip_reasons:
+        return empty
     reasons = ", ".join(f"{count} {why}" for why, count in sorted(skip_reasons.items()))
-    if not reasons:
-        return "the plate is empty: put a sample there, or check light and focus"
+    if set(skip_reasons) == {TOO_FAINT}:
+        # The noise of an image alone brings such a sighting now and then.
+        return f"{empty} ({reasons} to be told from the noise)"
     return f"none on the plate can be grasped ({reasons}): spread them, or put another sample there"
 
 
@@ -118,7 +123,9 @@ def _leave_fallen(
 def _candidate(work: HandlingContext, seen: SeenFibre, line_um: Floats) -> Candidate:
     settings, doubts = work.settings.grasp, " ".join(seen.fibre.doubts)
     problem = ""
-    if "border" in doubts:
+    if "hardly stands out" in doubts:
+        problem = TOO_FAINT
+    elif "border" in doubts:
         problem = OUT_OF_FIELD
     elif "cross" in doubts or "branch" in doubts or "several" in doubts:
         problem = CROSSING

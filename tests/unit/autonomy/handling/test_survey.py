@@ -1,6 +1,7 @@
 """What of a survey may be taken up, and why the rest may not."""
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.frame.clock import ManualClock
 
 SCALE_UM_PX = 7.6
+FAINT = "hardly stands out from the noise"
 
 
 class Bench(HandlingContext):
@@ -80,12 +82,26 @@ def looked(*seen: Seen) -> Bench:
         (Seen(0.0, 0.0, doubts=("a crossing can be read in two ways",)), survey.CROSSING),
         (Seen(0.0, 0.0, doubts=("the image's border cuts it off",)), survey.OUT_OF_FIELD),
         (Seen(0.0, 0.0, doubts=("it runs into something wider",)), survey.NOT_CERTAIN),
+        (Seen(0.0, 0.0, doubts=(FAINT, "the image's border cuts it off")), survey.TOO_FAINT),
     ],
 )
 def test_what_is_not_taken_is_counted_by_its_reason(seen: Seen, problem: str):
     bench = looked(seen)
     assert bench.shared.candidates == []
     assert bench.shared.skip_reasons == {problem: 1}
+
+
+@pytest.mark.parametrize(
+    ("reasons", "message"),
+    [
+        ({}, "^the plate is empty: put a sample there, or check light and focus$"),
+        ({survey.TOO_FAINT: 2}, r"^the plate is empty: .*light and focus \(2 too faint to be told"),
+        ({survey.TOO_FAINT: 2, survey.CROSSING: 1}, r"can be grasped \(1 crossing, 2 too faint\)"),
+    ],
+    ids=["nothing", "noise", "noise and fibres"],
+)
+def test_noise_on_an_image_is_no_fibre_on_the_plate(reasons: dict[str, int], message: str):
+    assert re.search(message, survey.none_left(reasons))
 
 
 def test_two_that_lie_close_together_are_both_left():
