@@ -70,6 +70,10 @@ REACH_PX: Final = 40.0
 GRID: Final = 3
 LARGEST_PART: Final = 0.25
 """Of the image: how far the grid reaches to each side."""
+UNSURE_PX: Final = 0.1
+"""A tip that is seen less surely is looked at again beside: a fibre may lie across its front."""
+BESIDE: Final = ((0.0, 0.0), (-1.2, 0.9), (-1.2, -0.9))
+"""Where it is looked at, one after the other: ahead and aside, in widths of the tool."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +91,14 @@ class TipMap:
     def um(self, point_px: Floats) -> Floats:
         """Return where the tip is that is seen at a pixel, shape (2,)."""
         return np.asarray(self.position_um + np.linalg.solve(self.px_um, point_px - self.tip_px))
+
+
+@dataclass(frozen=True, slots=True)
+class TipSeen:
+    """The tip on an image: where, and the standard deviation of a coordinate; its pixels."""
+
+    point_px: Floats
+    std_px: float
 
 
 class StageProcedure:
@@ -147,7 +159,7 @@ class StageProcedure:
         sightings = []
         for number, position in enumerate(positions, start=1):
             task.report(number / (len(positions) + 1), f"position {number} of {len(positions)}")
-            seen = self.sight(task, position, guess)
+            seen = self._surest(task, position, guess)
             if seen is not None:
                 sightings.append(seen)
         zoom = self._zoom(first)
@@ -211,7 +223,7 @@ class StageProcedure:
         seen = self._look(images[-1], guess, guess.position_um, REACH_PX)
         if isinstance(seen, NotSeen):
             raise NotAvailable(self._unseen(seen.reason))
-        return self._aside(task, guess, seen, step_um)
+        return self._aside(task, guess, seen.point_px, step_um)
 
     def _aside(self, task: Task, guess: TipMap, tip_px: Floats, step_um: Floats) -> TipMap:
         """Learn what a step aside does: no idea of the camera's handedness is taken for granted."""
@@ -224,7 +236,7 @@ class StageProcedure:
         if isinstance(seen, NotSeen):
             raise NotAvailable(self._unseen(seen.reason))
         both_um = np.column_stack([step_um, aside_um])
-        both_px = np.column_stack([guess.px_um @ step_um, seen - tip_px])
+        both_px = np.column_stack([guess.px_um @ step_um, seen.point_px - tip_px])
         return TipMap(guess.position_um, tip_px, both_px @ np.linalg.inv(both_um))
 
     @staticmethod
@@ -263,6 +275,22 @@ class StageProcedure:
         ]
         return [position for row in rows for position in row]
 
+    def _surest(self, task: Task, position_um: Floats, guess: TipMap) -> Sighting | None:
+        """Look for the tip at a position, and where it is seen unsurely beside it as well.
+
+        Returns the surest sighting; None where it was not seen.
+        """
+        found: list[Sighting] = []
+        aside = np.array([-self.ahead[1], self.ahead[0]])
+        for far_ahead, far_aside in BESIDE:
+            away_um = self._tool.width_um * (far_ahead * self.ahead + far_aside * aside)
+            seen = self.sight(task, position_um + away_um, guess)
+            if seen is not None:
+                found.append(seen)
+                if seen.std_px <= UNSURE_PX:
+                    break
+        return min(found, key=lambda each: each.std_px, default=None)
+
     def sight(self, task: Task, position_um: Floats, guess: TipMap) -> Sighting | None:
         """Move the tip to a position and look for it; None where it was not seen."""
         image = self._image(self._go(task, position_um))
@@ -270,12 +298,13 @@ class StageProcedure:
         seen = self._look(image, guess, np.array(stood[:2]), REACH_PX)
         if isinstance(seen, NotSeen):
             return None
-        sensor = self._on_sensor(seen, image)
-        return Sighting((stood[0], stood[1]), (float(sensor[0]), float(sensor[1])))
+        sensor, binning = self._on_sensor(seen.point_px, image)
+        point_px = float(sensor[0]), float(sensor[1])
+        return Sighting((stood[0], stood[1]), point_px, std_px=seen.std_px * binning)
 
     def _look(
         self, image: CameraImage, guess: TipMap, position_um: Floats, reach_px: float
-    ) -> Floats | NotSeen:
+    ) -> TipSeen | NotSeen:
         """Return where the tip is seen, in the image's pixels."""
         tip = guess.px(position_um)
         forward = guess.px_um @ np.array(self._tool.forward)
@@ -292,14 +321,15 @@ class StageProcedure:
         found = find(grey(image.data), wanted)
         if isinstance(found, NotSeen):
             return found
-        return np.array(found.hold_px if isinstance(found, GripperTips) else found.tip_px)
+        at = found.hold_px if isinstance(found, GripperTips) else found.tip_px
+        return TipSeen(np.array(at), found.std_px)
 
-    def _on_sensor(self, point_px: Floats, image: CameraImage) -> Floats:
-        """Return a position in unbinned pixels of the whole sensor."""
+    def _on_sensor(self, point_px: Floats, image: CameraImage) -> tuple[Floats, int]:
+        """Return a position in unbinned pixels of the whole sensor, and the binning."""
         settings = self._unit.thread.settings
         if settings is None:
             raise NotAvailable(f"{image.camera}: the camera was lost")
-        return whole_sensor_px(point_px, settings)
+        return whole_sensor_px(point_px, settings), settings.binning
 
     def _go(self, task: Task, position_um: Floats) -> float:
         x_um, y_um = position_um.tolist()

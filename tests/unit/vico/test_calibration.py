@@ -139,6 +139,22 @@ def test_a_poor_fit_is_refused_with_its_residual() -> None:
         fit_map(look(grid(count=5, step_um=150.0), noise_px=0.55))
 
 
+def test_a_tip_that_was_seen_unsurely_hardly_moves_the_map() -> None:
+    sightings = look(grid(), noise_px=0.03)
+    off = [(0, 1.4, 0.9), (4, -1.3, 0.6), (7, 1.2, 0.7)]  # fibres lie across the front there
+    seen = list(sightings)
+    for number, away_px, std_px in off:
+        x, y = seen[number].image_px
+        seen[number] = replace(seen[number], image_px=(x + away_px, y), std_px=std_px)
+    with pytest.raises(CalibrationRefused, match="residual"):
+        fit_map([replace(each, std_px=0.0) for each in seen])
+    fit = fit_map(seen)
+    assert fit.rms_px < 0.12
+    true = fit_map(look(grid(), noise_px=0.0)).map
+    corners = grid()
+    assert np.abs(fit.map.to_px(corners) - true.to_px(corners)).max() < 0.15
+
+
 def test_an_axis_that_did_not_travel_the_whole_distance_is_refused() -> None:
     short = [
         replace(each, platform_um=(each.platform_um[0], 1.2 * each.platform_um[1]))

@@ -18,7 +18,8 @@ from cosmic.vico.core.calibration_fit import CalibrationRefused, RotationFit, fi
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats
 
-AWAY_DEG: Final = (-40.0, -20.0, 0.0, 20.0, 40.0, 60.0)
+STEP_DEG: Final = 20.0
+ANGLES: Final = 6
 MARGIN_UM: Final = 200.0
 SAME_LENGTH: Final = 0.03
 MOST_FIBRES: Final = 3
@@ -74,8 +75,8 @@ def _followed(
 ) -> Generator[Yielded, object, RotationFit]:
     angles: list[float] = []
     lines: list[Floats] = []
-    for away in AWAY_DEG:
-        yield work.go({work.table: begun_deg + away})
+    for wanted_deg in angles_about(begun_deg, work.settings.grasp.largest_turn_deg):
+        yield work.go({work.table: wanted_deg})
         image = yield work.image()
         assert isinstance(image, CameraImage)
         angle = work.table_deg
@@ -86,6 +87,14 @@ def _followed(
         angles.append(angle)
         lines.append(_in_order(seen.line_um, wanted))
     return best_circle(angles, lines)
+
+
+def angles_about(begun_deg: float, largest_deg: float) -> list[float]:
+    """Return the angles to look at: about where the table stands, and within its travel."""
+    first = begun_deg - STEP_DEG * (ANGLES // 2 - 1)
+    last = largest_deg - STEP_DEG * (ANGLES - 1)
+    first = max(min(first, last), -largest_deg)
+    return [first + STEP_DEG * number for number in range(ANGLES)]
 
 
 def _nearest(

@@ -20,6 +20,10 @@ SMALLEST_SPREAD_PX: Final = 15.0
 NARROWEST: Final = 0.1
 LARGEST_ANISOTROPY: Final = 0.05
 MOST_TRIPLES: Final = 400
+SURE_PX: Final = 0.1
+"""Standard deviation below which all sightings count alike."""
+STD_TIMES: Final = 4.0
+"""By so much what an edge's scatter says is too small where something lies across it."""
 
 FEWEST_ANGLES: Final = 5
 SMALLEST_TURN_DEG: Final = 30.0
@@ -44,11 +48,14 @@ class Sighting:
         On the whole sensor, unbinned; see `PixelMap`.
     label : str
         How an outlier is named; empty: by its number, from 1.
+    std_px : float
+        Standard deviation of a coordinate in the image; what is less sure counts less.
     """
 
     platform_um: Pair
     image_px: Pair
     label: str = ""
+    std_px: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,16 +83,18 @@ def fit_map(sightings: Sequence[Sighting], *, limit_px: float = LARGEST_RMS_PX) 
     ------
     CalibrationRefused
         Too few points, too close together or on a line; too many outliers; residual above
-        `limit_px` RMS; the two axes are seen at different scales.
+        `limit_px` RMS, where unsure sightings count less; the two axes are seen at different
+        scales.
     """
     points = np.array([each.platform_um for each in sightings], dtype=np.float64).reshape(-1, 2)
     seen = np.array([each.image_px for each in sightings], dtype=np.float64).reshape(-1, 2)
     if not (np.isfinite(points).all() and np.isfinite(seen).all()):
         raise CalibrationRefused("calibration: a point or a pixel is not a number; track again")
     _check_points(points, seen)
-    kept = _inliers(points, seen)
+    weights = _weights(sightings)
+    kept = _inliers(points, seen, weights)
     left_out = np.flatnonzero(~kept).tolist()
-    fitted, residuals_px = _least_squares(points[kept], seen[kept])
+    fitted, residuals_px = _least_squares(points[kept], seen[kept], weights[kept])
     off_px = np.linalg.norm(fitted.to_px(points) - seen, axis=1)
     outliers = tuple(
         f"{sightings[i].label or f'point {i + 1}'}: {off_px[i]:.1f} px off" for i in left_out
@@ -96,7 +105,7 @@ def fit_map(sightings: Sequence[Sighting], *, limit_px: float = LARGEST_RMS_PX) 
             f"({'; '.join(outliers)}); check that the right object was tracked and is in focus"
         )
     _check_points(points[kept], seen[kept])
-    rms_px = float(np.sqrt(np.mean(residuals_px**2)))
+    rms_px = math.sqrt(float(np.average(residuals_px**2, weights=weights[kept])))
     _check_map(fitted, rms_px, limit_px)
     return MapFit(fitted, rms_px, float(residuals_px.max()), outliers)
 
@@ -134,11 +143,18 @@ def _check_map(fitted: PixelMap, rms_px: float, limit_px: float) -> None:
         )
 
 
-def _least_squares(points: Floats, seen: Floats) -> tuple[PixelMap, Floats]:
+def _weights(sightings: Sequence[Sighting]) -> Floats:
+    """Return how much each sighting counts; 1 for those that are sure."""
+    std_px = STD_TIMES * np.array([each.std_px for each in sightings], dtype=np.float64)
+    return np.asarray(SURE_PX**2 / (SURE_PX**2 + std_px**2))
+
+
+def _least_squares(points: Floats, seen: Floats, weights: Floats) -> tuple[PixelMap, Floats]:
     """Return the map and how far each point is from it, px."""
-    centre_um, centre_px = points.mean(axis=0), seen.mean(axis=0)
-    away = points - centre_um
-    solution = np.linalg.lstsq(away, seen - centre_px, rcond=None)[0]
+    centre_um = weights @ points / weights.sum()
+    centre_px = weights @ seen / weights.sum()
+    away, root = points - centre_um, np.sqrt(weights)[:, None]
+    solution = np.linalg.lstsq(root * away, root * (seen - centre_px), rcond=None)[0]
     error = away @ solution - (seen - centre_px)
     # Two coordinates a point; six numbers of the map are taken from them.
     freedom = max(1, 2 * len(points) - 6)
@@ -146,14 +162,14 @@ def _least_squares(points: Floats, seen: Floats) -> tuple[PixelMap, Floats]:
         as_matrix(solution.T),
         as_pair(centre_um),
         as_pair(centre_px),
-        math.sqrt(float(np.sum(error**2)) / freedom),
-        as_matrix(np.linalg.inv(away.T @ away)),
+        math.sqrt(float(np.sum((root * error) ** 2)) / freedom),
+        as_matrix(np.linalg.inv((root * away).T @ (root * away))),
         len(points),
     )
     return fitted, np.asarray(np.linalg.norm(error, axis=1))
 
 
-def _inliers(points: Floats, seen: Floats) -> npt.NDArray[np.bool_]:
+def _inliers(points: Floats, seen: Floats, weights: Floats) -> npt.NDArray[np.bool_]:
     """Return which sightings agree with most of the others (least median of squares)."""
     best_px, kept = math.inf, np.ones(len(points), dtype=np.bool_)
     for triple in _triples(len(points)):
@@ -170,7 +186,7 @@ def _inliers(points: Floats, seen: Floats) -> npt.NDArray[np.bool_]:
     for _ in range(3):
         if kept.sum() < FEWEST_POINTS:
             return kept
-        fitted, near_px = _least_squares(points[kept], seen[kept])
+        fitted, near_px = _least_squares(points[kept], seen[kept], weights[kept])
         off_px = np.linalg.norm(fitted.to_px(points) - seen, axis=1)
         limit_px = max(OUTLIER_PX, 4.0 * float(np.median(near_px)))
         kept = off_px <= limit_px

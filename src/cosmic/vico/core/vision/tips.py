@@ -33,6 +33,8 @@ LARGEST_SKEW_DEG: Final = 2.0
 FILLED: Final = 0.2
 BROADER_PX: Final = 0.6
 BROADER: Final = 0.02
+BROAD_STD_PX: Final = 0.4
+"""Of an inner corner that is reckoned from the outer one: how broad a jaw looks is not exact."""
 ROUGHER: Final = 2.0
 LARGEST_STEP_PX: Final = 1.5
 
@@ -187,6 +189,7 @@ def _gripper(
     gap_std = math.hypot(
         (first.low if broad[0] else first.high).std_at(one[0]),
         (second.high if broad[1] else second.low).std_at(other[0]),
+        BROAD_STD_PX * sum(broad),
     )
     ahead_std = math.hypot(first.front.std_at(one[1]), second.front.std_at(other[1]))
     return GripperTips(
