@@ -377,11 +377,20 @@ class Fibre:
         travel_um: float,
         probe: "ProbeShape",
         time_s: float,
+        *,
+        back_um: float = 0.0,
     ) -> PushCurve | RubbedPush:
-        """Return force over travel for a probe at an abscissa, which has come so far."""
+        """Return force over travel for a probe at an abscissa, which has come so far.
+
+        Parameters
+        ----------
+        travel_um, back_um : float
+            From where it would stand without the probe, and how far that is back by now.
+        """
         (hold, *more) = self.holds.values()
         if line.free is not None:
-            part = self._rubbing.follow(travel_um)
+            # What crept stands back: the contact itself does not slide while the probe stands.
+            part = self._rubbing.follow(travel_um + back_um)
             growing, *falling = self._held_at_one_end(hold, line.free, abscissa_um, probe, time_s)
             return RubbedPush(growing, falling[0], part) if falling else growing
         distance = _rounded(line.reach_um + hold.depth_um + more[0].depth_um)

@@ -225,6 +225,20 @@ def test_friction_holds_a_ribbon_that_stands_askew() -> None:
     assert held.loop > free.loop + 0.1
 
 
+def test_friction_does_not_turn_round_while_the_probe_stands_and_the_fibre_creeps() -> None:
+    askew = {"plane_ratio": 8.0, "orientation_deg": 60.0, "relaxation_per_decade": 0.03}
+    bench = Bench(settings(FIBRE.model_copy(update=askew), probe_friction=0.35), 0)
+    bench.go(left_x=3600.0).go(left_z=-810.0)
+    state = bench.moment.fibres[0]
+    x, y, _ = state.line_um[np.argsort(state.line_um[:, 0])].T
+    at = bench.scene.tips(bench.now_s)["probe"][0]
+    touch = -5000.0 + 0.5 * state.seen_um + float(np.interp(at, x, y))
+    bench.go(probe_y=touch + 20.0)
+    soon = signal(bench.go(200.0, probe_y=touch - 12.0))
+    later = [signal(bench.wait(0.02)) for _ in range(40)][-1]
+    assert 0.85 * soon < later < soon, "it relaxes by some per cent in each decade, and no more"
+
+
 def test_a_soft_probe_goes_along_on_a_curled_fibre() -> None:
     curl = FIBRE.model_copy(update={"curl_deg": 45.0 * FIBRE.length_um / TURNED_UM})
     stiff, soft = (lever_fit(settings(curl, probe_side_un_um=each)).ei_off for each in (1e9, 5.0))
