@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
 from functools import partial
 from itertools import combinations
 from pathlib import Path
@@ -26,10 +27,13 @@ from pytestqt.qtbot import QtBot
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.app.windows.stage import Stage
 from cosmic.app.windows.tasks import HANDLE, LOOK, MEASURE, SET_UP, TaskLayout
+from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.limit_indicator import LimitIndicator
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.stop_button import StopButton
+from cosmic.vico.core.calibration import Plane
+from cosmic.vico.core.calibration_fit import Sighting, fit_map
 from gui.app.windows import Make, mico
 from gui.mico.panels import part, position
 
@@ -235,6 +239,27 @@ def test_a_stop_is_shown_beside_the_tool_and_the_coach_resets_it(
     qtbot.mouseClick(button, LEFT)
     qtbot.waitUntil(lambda: not whole.top_bar.latched)
     assert "STOPPED" not in tasks(whole).tool.line.text()
+
+
+def test_the_coach_says_what_a_calibration_high_above_the_plate_is_not_good_for(
+    whole: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(whole, qtbot, LOOK)
+    words = part(whole.findChild(QWidget, "coach"), "coachWords", QLabel)
+    qtbot.waitUntil(lambda: "needs a calibration" in words.text())
+    camera = tasks(whole).stage.camera.camera
+    transform = whole.platform.vico.transform if whole.platform.vico is not None else None
+    assert isinstance(transform, PlatformTransform)
+    places = [(x, y) for x in (-300.0, 0.0, 300.0) for y in (-300.0, 0.0, 300.0)]
+    seen = [Sighting((x, y), (800.0 + x / 2.0, 600.0 - y / 2.0)) for x, y in places]
+    newest = camera.latest()
+    zoom = newest.circumstances.zoom_counts if newest is not None else None
+    assert zoom is not None
+    plane = Plane(zoom, 1500.0, fit_map(seen), datetime.now(UTC))
+    transform.calibrations.add_plane(camera.name, "left", plane)
+    qtbot.waitUntil(lambda: "Not calibrated for what lies on the plate" in words.text())
+    assert "height 0 um lies outside what was measured (1500 um)" in words.text()
+    assert "Bring a tool down" in words.text()
 
 
 def test_the_force_is_shown_with_its_limit_and_greyed_when_it_is_not_measured(

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QPoint, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QWheelEvent
 from PySide6.QtWidgets import QApplication
 
@@ -268,6 +268,22 @@ def test_the_pixel_below_the_mouse_is_shown_with_its_position_on_the_platform(sh
     assert shown.pointer.text.startswith("800, 600 px = 100  at ")
     mouse.move((-50, 20))
     assert shown.pointer.text == ""
+
+
+def test_a_message_and_the_pointer_leave_the_scale_bar_to_be_read(shown, mouse):
+    mouse.move((400, 200))
+    shown.say("a long refusal, which says what, where and what to do; " * 6)
+    shown.grab()
+    assert not shown.scale_bar.box.isEmpty()
+    assert not shown.message.box.isEmpty()
+    assert not shown.message.box.intersects(shown.scale_bar.box)
+    assert not shown.pointer.box.isEmpty()
+    assert not shown.pointer.box.intersects(shown.scale_bar.box)
+    assert not shown.pointer.box.intersects(shown.message.box)
+    assert QRectF(shown.view.rect()).contains(shown.message.box)
+    shown.scale_bar.shown = False
+    shown.grab()
+    assert shown.message.box.left() < 20.0
 
 
 def test_the_scale_bar_goes_by_the_scale_when_the_image_was_taken(qtbot, shown, camera):

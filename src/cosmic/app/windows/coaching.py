@@ -194,7 +194,15 @@ class _Rules:
 
     def _look(self) -> Step:
         camera = self._parts.stage.camera.camera
-        if camera.calibration_problem:
+        problem = camera.calibration_problem
+        if problem and camera.calibrated:
+            text = (
+                f"Not calibrated for what lies on the plate: {problem}. Bring a tool down to about "
+                "50 µm above the plate, at this zoom, and Calibrate again; or take a fibre in "
+                "Handle, which calibrates by itself."
+            )
+            return Step(text, "Handle", self._go("Handle"))
+        if problem:
             text = (
                 "Click-to-move needs a calibration: Calibrate in the column at the left moves a "
                 "tool and finds it in the image."

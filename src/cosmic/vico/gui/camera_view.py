@@ -116,9 +116,10 @@ class CameraView(QWidget):
         self.form = SettingsForm(self._camera, self)
         self.chooser = CameraChooser(vico, name)
         self.recorder = RecordBar(self._camera, now=now)
-        self.pointer, self.message = CornerText(top=False), CornerText(top=True)
+        self.message = CornerText(beside=self.scale_bar)
+        self.pointer = CornerText(below=(self.scale_bar, self.message))
         self.tools = ImageTools(self.view, self.row, self._camera, self)
-        corners = (self.scale_bar, self.pointer, self.message)
+        corners = (self.scale_bar, self.message, self.pointer)
         self.view.layers = [
             self.cross,
             self.seen,

@@ -1,6 +1,7 @@
 """Layers over the image that only show: crosshair, scale bar, note."""
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, Qt
@@ -60,11 +61,13 @@ class ScaleBar(Layer):
         self.text = ""
         self.length_px = 0.0
         """Of the bar, on the screen."""
+        self.box = QRectF()
+        """Where it was drawn; empty where it was not."""
 
     @override
     def paint(self, painter: QPainter, view: CameraImageView) -> None:
         if not self.shown or view.image is None:
-            self.text = ""
+            self.text, self.box = "", QRectF()
             return
         room = _visible(view)
         self._measure(view, room.width())
@@ -75,6 +78,7 @@ class ScaleBar(Layer):
         height = metrics.height() + 2 * STEP_PX
         # The scene's inset and the bar of the camera lie over the lower edge.
         box = QRectF(room.left() + EDGE_PX, room.top() + EDGE_PX, width, height)
+        self.box = box
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(HALO)
         painter.drawRoundedRect(box, 3.0, 3.0)
@@ -103,31 +107,45 @@ class ScaleBar(Layer):
 
 
 class CornerText(Layer):
-    """One line in a corner of the view, on a dark ground.
+    """One line in the upper left corner of the view, on a dark ground.
+
+    The scene's inset and the bar of the camera lie over the lower edge.
 
     Parameters
     ----------
-    top : bool
-        In the upper left corner; else in the lower left one.
+    beside : ScaleBar, optional
+        What has that corner, where it is shown: it is drawn before, and this at its right.
+    below : sequence of ScaleBar or CornerText
+        What is drawn before, and this below it.
     """
 
-    def __init__(self, *, top: bool) -> None:
+    def __init__(
+        self, *, beside: ScaleBar | None = None, below: "Sequence[ScaleBar | CornerText]" = ()
+    ) -> None:
         self.text = ""
-        self._top = top
+        self.box = QRectF()
+        """Where it was drawn; empty where it was not."""
+        self._beside, self._below = beside, tuple(below)
 
     @override
     def paint(self, painter: QPainter, view: CameraImageView) -> None:
+        self.box = QRectF()
         if not self.text:
             return
         font = ink_font(bold=False)
         metrics = QFontMetricsF(font)
         room = QRectF(view.rect()).adjusted(STEP_PX, STEP_PX, -STEP_PX, -STEP_PX)
+        if self._beside is not None and not self._beside.box.isEmpty():
+            room.setLeft(self._beside.box.right() + STEP_PX)
+        above = [each.box for each in self._below if not each.box.isEmpty()]
+        if above:
+            room.setTop(max(box.bottom() for box in above) + STEP_PX)
+            room.setLeft(min(box.left() for box in above))
         most = room.width() - 2 * STEP_PX
         flags = int(Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap)
         needed = metrics.boundingRect(QRectF(0.0, 0.0, most, room.height()), flags, self.text)
         box = QRectF(room.left(), room.top(), needed.width() + 2 * STEP_PX, needed.height() + 6)
-        if not self._top:
-            box.moveBottom(room.bottom())
+        self.box = box
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(ON_IMAGE["text"]))
         painter.drawRoundedRect(box, 3.0, 3.0)
