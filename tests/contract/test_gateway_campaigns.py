@@ -1,10 +1,13 @@
 """Campaigns at the gateways: by the declaration alone, with the same right and approval."""
 
 import json
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -25,6 +28,8 @@ from cosmic.frame.network.host import Host
 from cosmic.frame.network.station import Station
 
 TOKEN = "m" * 20
+FACTS = {"platform": "test", "simulated": True, "applications": ()}
+BROWSER = Path(__file__).with_name("browser_child.py")
 
 
 class StandIn:
@@ -79,6 +84,7 @@ class StandIn:
 class Door:
     http: httpx.Client
     epics: int
+    page: str
     approvals: Approvals
     begun: list[StandIn] = field(default_factory=list)
 
@@ -114,7 +120,7 @@ def opened(home: Path, *, approve: bool = False) -> Iterator[Door]:
         client = HttpClient(name="lab", token=TOKEN, access="move")
         web = HttpSettings(listen=f"127.0.0.1:{free_port()}", client=(client,))
         http = HttpGateway(
-            station, {"campaigns": host}, web, {}, approvals.ask if approve else None
+            station, {"campaigns": host}, web, FACTS, approvals.ask if approve else None
         )
         at_end.callback(http.close)
         records = EpicsGateway(
@@ -123,7 +129,8 @@ def opened(home: Path, *, approve: bool = False) -> Iterator[Door]:
         at_end.callback(records.close)
         headers = {"Authorization": f"Bearer {TOKEN}"}
         made = httpx.Client(base_url=http.address, headers=headers, timeout=30.0)
-        yield Door(at_end.enter_context(made), records.port, approvals, begun)
+        address = f"{http.address}#token={TOKEN}"
+        yield Door(at_end.enter_context(made), records.port, address, approvals, begun)
 
 
 def test_a_campaign_is_started_watched_and_ended_over_http_and_mcp(tmp_path: Path) -> None:
@@ -168,6 +175,43 @@ def test_who_started_a_campaign_and_falls_silent_ends_it(tmp_path: Path) -> None
         assert wait_until(lambda: door.begun[0].phase == "stopped", 5.0)
 
 
+def test_an_assistant_keeps_the_right_to_move_while_it_thinks_and_not_when_it_is_gone(
+    tmp_path: Path,
+) -> None:
+    with opened(tmp_path) as door:
+        taken = json.loads(door.tool("take_control", keep_s=2.5))
+        assert taken["in_control"]
+        assert "silent for 2.5 s" in taken["control"]["why"], "a window shows how long"
+        door.tool("campaigns_start", recipe="mine", folder="first")
+        assert not wait_until(lambda: door.begun[0].over, 1.8), "it thinks"
+        assert json.loads(door.tool("read_state", application="campaigns", path="done")) == 3
+        assert wait_until(lambda: door.begun[0].phase == "stopped", 6.0), "it is gone"
+        assert door.http.get("/api/station").json()["control"]["local"]
+        assert "NO_LEASE" in door.command("resume").text
+
+
+def test_an_assistant_follows_and_ends_what_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosmic.app.gateways.http.MCP_WAIT_S", 0.1)
+    with opened(tmp_path) as door:
+        door.tool("take_control")
+        begun = json.loads(door.tool("campaigns_start", recipe="mine", folder="first"))
+        assert begun["goes_on"] == "campaign mine"
+        follow = {"operation": begun["operation"], "wait_s": 0.5}
+        assert json.loads(door.tool("follow_operation", **follow))["operation"]
+        assert "ended by" in door.tool("follow_operation", **follow, end=True)
+        assert door.begun[0].phase == "stopped"
+        assert not json.loads(door.tool("release_control"))["in_control"]
+
+
+def test_nobody_keeps_the_right_to_move_longer_than_the_platform_allows(tmp_path: Path) -> None:
+    with opened(tmp_path) as door:
+        assert "60" in door.http.post("/api/control?keep=3600").json()["error"]["text"]
+        door.tool("take_control", keep_s=3600)
+        assert "silent for 60 s" in door.http.get("/api/station").json()["control"]["why"]
+
+
 def test_a_campaign_waits_for_a_persons_approval(tmp_path: Path) -> None:
     with opened(tmp_path, approve=True) as door:
         door.http.post("/api/control")
@@ -202,3 +246,25 @@ def test_a_campaign_is_started_and_watched_as_records_of_epics(tmp_path: Path) -
         finally:
             client.end()
             watcher.end()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    find_spec("PySide6.QtWebEngineWidgets") is None, reason="there is no browser of Qt here"
+)
+def test_the_page_shows_a_campaign_in_a_browser(tmp_path: Path) -> None:
+    with opened(tmp_path) as door:
+
+        def shown(wanted: str) -> str:
+            command = [sys.executable, str(BROWSER), door.page, wanted]
+            done = subprocess.check_output(command, stderr=subprocess.DEVNULL, text=True)
+            return " ".join(done.split())
+
+        assert "Campaign none was started here" in shown("none was started")
+        door.http.post("/api/control?keep=60")
+        door.command("start", recipe="mine", folder="first")
+        text = shown("running")
+        assert "Recipe mine in first State running Operation take the fibre" in text
+        assert "Fibres 3 done, 1 failed Good 2 (67 %) Elapsed 20 s, left: 1 min 0 s" in text
+        door.command("abort", reason="enough")
+        assert "State stopped: enough" in shown("enough")

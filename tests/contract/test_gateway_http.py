@@ -20,8 +20,8 @@ from contract.cabinet import Cabinet, WithBell
 from contract.station_rig import free_port, wait_until
 from cosmic.app.configuration.gateways import HttpClient, HttpSettings, doors
 from cosmic.app.gateways.approvals import Approvals
-from cosmic.app.gateways.http import BODY_LIMIT_BYTES, HttpGateway
-from cosmic.app.gateways.http_server import listening
+from cosmic.app.gateways.http import HttpGateway
+from cosmic.app.gateways.http_server import BODY_LIMIT_BYTES, listening
 from cosmic.app.gateways.openapi import mcp_tools
 from cosmic.app.panels.approvals import ApprovalsPanel
 from cosmic.frame.errors import ConfigError
@@ -408,3 +408,14 @@ def test_an_address_beyond_this_computer_needs_certificate_and_clients(settings:
 
     with pytest.raises(ConfigError):
         doors(HttpSettings(**settings), EpicsSettings())
+
+
+@pytest.mark.parametrize("listen", ["no such host", "no-such-host.invalid:8470", "127.0.0.1:x"])
+def test_what_is_no_address_is_named_and_nothing_is_said_of_certificates(listen: str) -> None:
+    from cosmic.app.configuration.gateways import EpicsSettings
+
+    with pytest.raises(
+        ConfigError, match=f"(?s){listen.partition(':')[0]}.*127.0.0.1:8470"
+    ) as told:
+        doors(HttpSettings(), EpicsSettings(), listen=listen)
+    assert "certificate" not in str(told.value)

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
+from cosmic.daqco.core.unclosed_file import is_unclosed
 from cosmic.frame.errors import RecordingError, RecordingExistsError
 from cosmic.frame.version import __version__
 
@@ -39,11 +40,14 @@ class Packed:
     ----------
     size_bytes : int
         Of all files together, before they were packed.
+    unclosed : tuple of Path
+        Recordings that are cut off or were not closed by their writer, packed as they are.
     """
 
     path: Path
     files: int
     size_bytes: int
+    unclosed: tuple[Path, ...] = ()
 
 
 def pack_session(sources: Iterable[Path], target: Path, *, name: str = "") -> Packed:
@@ -69,11 +73,14 @@ def pack_session(sources: Iterable[Path], target: Path, *, name: str = "") -> Pa
     if target.exists():
         raise RecordingExistsError(f"{target}: there is such a file; choose another name")
     part = target.with_name(target.name + ".part")
-    size_bytes, entities = 0, []
+    size_bytes, entities, unclosed = 0, [], []
     try:
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, allowZip64=True) as file:
             for inside, path in found.items():
                 entity = _packed(file, inside, path)
+                if path.suffix == ".h5" and is_unclosed(path):
+                    unclosed.append(path)
+                    entity["description"] += "; not closed by its writer, or cut off"
                 size_bytes += int(entity["contentSize"])
                 entities.append(entity)
             file.writestr(METADATA, json.dumps(_crate(entities, name or target.stem), indent=2))
@@ -81,7 +88,7 @@ def pack_session(sources: Iterable[Path], target: Path, *, name: str = "") -> Pa
     except OSError as exc:
         part.unlink(missing_ok=True)
         raise RecordingError(f"{target}: cannot be written ({exc.strerror or exc})") from exc
-    return Packed(target, len(found), size_bytes)
+    return Packed(target, len(found), size_bytes, tuple(unclosed))
 
 
 def _named(sources: Iterable[Path]) -> Iterator[tuple[str, Path]]:

@@ -2,9 +2,11 @@
 
 import hashlib
 import json
+import os
 import zipfile
 from pathlib import Path
 
+import h5py
 import pytest
 
 from cosmic.app.cli import main
@@ -55,6 +57,24 @@ def test_what_cannot_be_packed_is_said_and_nothing_is_left(session: Path) -> Non
     with pytest.raises(RecordingExistsError):
         pack_session([session / "campaign"], target)
     assert target.read_text() == "mine"
+
+
+def test_recordings_that_were_not_closed_are_named(
+    session: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = session / "campaign" / "fibres" / "0002.h5"
+    with h5py.File(path, "w", libver="latest") as file:
+        file["data"] = list(range(5000))
+    os.truncate(path, path.stat().st_size - 100)
+    target = session / "tuesday.zip"
+    assert main(["session", "pack", str(session / "campaign"), "--output", str(target)]) == 0
+    said = capsys.readouterr().err
+    assert f"cosmic repair {path}" in said
+    assert "0001.h5" not in said
+    with zipfile.ZipFile(target) as file:
+        described = json.loads(file.read(METADATA))
+    known = {each["@id"]: each for each in described["@graph"]}
+    assert "cut off" in known["campaign/fibres/0002.h5"]["description"]
 
 
 def test_the_command_packs(session: Path, capsys: pytest.CaptureFixture[str]) -> None:

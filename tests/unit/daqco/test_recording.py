@@ -454,6 +454,23 @@ def test_a_missing_file_and_a_foreign_one_are_distinguished(tmp_path):
         open_recording(tmp_path / "other.h5")
 
 
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.6])
+def test_a_recording_that_is_cut_off_is_called_so(tmp_path, share):
+    path = record(tmp_path / "run.h5", header(), volts_of(2, 2000))
+    os.truncate(path, int(path.stat().st_size * share))
+    with pytest.raises(RecordingError, match=r"run\.h5: is cut off.*Run cosmic repair .*run\.h5"):
+        open_recording(path)
+
+
+def test_a_closed_recording_that_lost_its_end_is_not_complete(tmp_path):
+    path = record(tmp_path / "run.h5", header(), volts_of(2, 2000))
+    with h5py.File(path, "r+", libver="latest") as file:
+        file["notes"] = np.arange(5000)
+    os.truncate(path, path.stat().st_size - 1000)
+    with open_recording(path) as found:
+        assert not found.complete
+
+
 def test_a_recording_of_a_newer_format_is_refused(tmp_path):
     path = record(tmp_path / "run.h5", header(), [])
     with h5py.File(path, "r+") as file:

@@ -17,6 +17,11 @@ def run(chosen: argparse.Namespace) -> int:
     if chosen.config is not None:
         sources.append(chosen.config)
     packed = pack_session(sources, chosen.output, name=chosen.title)
+    for path in packed.unclosed:
+        sys.stderr.write(
+            f"cosmic: {path}: is cut off, or was not closed by its writer; it is packed as it is. "
+            f"Run cosmic repair {path} and pack again\n"
+        )
     size_mb = packed.size_bytes / 1e6
     sys.stdout.write(f"{packed.path}: {packed.files} files, {size_mb:.1f} MB\n")
     return 0

@@ -3,6 +3,7 @@
 import secrets
 from dataclasses import dataclass
 from ipaddress import ip_address
+from socket import getaddrinfo
 from typing import Annotated, Final, Literal
 
 from pydantic import Field
@@ -31,6 +32,7 @@ class HttpSettings(StrictModel):
     certificate: str = ""
     key: str = ""
     approve: bool = False
+    keep_control_s: float = Field(default=60.0, ge=1.0, le=600.0)
     client: Annotated[tuple[HttpClient, ...], Field(strict=False)] = ()
 
     @property
@@ -116,14 +118,27 @@ def is_local(host: str) -> bool:
         return host == "localhost"
 
 
+def _check_address(host: str) -> None:
+    """Check that `host` is an address, or a name that stands for one."""
+    try:
+        getaddrinfo(host, None)
+    except (OSError, UnicodeError) as exc:
+        why = exc.strerror if isinstance(exc, OSError) else exc
+        raise ConfigError(
+            f"HTTP: {host!r} is no address ({why}); give ADDRESS:PORT, such as 127.0.0.1:8470"
+        ) from exc
+
+
 def _check_guarded(settings: HttpSettings) -> None:
     names = [each.name for each in settings.client]
     if len(set(names)) != len(names):
         raise ConfigError("[[network.http.client]]: two have the same name")
     if bool(settings.certificate) != bool(settings.key):
         raise ConfigError("[network.http]: certificate and key belong together")
-    if is_local(settings.where[0]):
+    host = settings.where[0]
+    if is_local(host):
         return
+    _check_address(host)
     if not settings.certificate or not settings.client:
         raise ConfigError(
             f"HTTP at {settings.listen} reaches beyond this computer: name certificate and key, "

@@ -144,6 +144,12 @@ class Campaigns(Declared):
 
     @property
     @state(quiet=True)
+    def elapsed_s(self) -> float:
+        """How long it has been carried out, on the platform's clock."""
+        return 0.0 if self._campaign is None else self._campaign.progress.elapsed_s
+
+    @property
+    @state(quiet=True)
     def left_s(self) -> float:
         """Time until it ends, on the platform's clock; nan: it cannot be told."""
         return math.nan if self._campaign is None else self._campaign.left_s

@@ -7,6 +7,7 @@ import secrets
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from hashlib import sha256
 from importlib.resources import files
 from itertools import count
@@ -20,10 +21,19 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from cosmic.app.configuration.gateways import HttpClient, HttpSettings
 from cosmic.app.gateways.catalogue import commands_of
-from cosmic.app.gateways.http_server import BEAT_S, BODY_LIMIT_BYTES, HttpServer, listening
+from cosmic.app.gateways.http_answers import (
+    HttpError,
+    answer_of,
+    body_of,
+    ended,
+    refusal_of,
+    seconds_of,
+    word_of,
+)
+from cosmic.app.gateways.http_server import BEAT_S, HttpServer, listening
 from cosmic.app.gateways.hub import Hub, Unfollow
 from cosmic.app.gateways.image_files import encoded_image, newest_image, shown_jpeg
-from cosmic.app.gateways.mcp import McpTools
+from cosmic.app.gateways.mcp import McpTools, McpUses
 from cosmic.app.gateways.openapi import described
 from cosmic.app.gateways.plain import to_json
 from cosmic.app.gateways.session import Approve, GatewaySession, Order
@@ -31,10 +41,10 @@ from cosmic.app.gateways.websocket_line import WebSocketLine
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.clock import WALL
 from cosmic.frame.declaration import Declared, declaration_of
-from cosmic.frame.errors import CosmicError, MoveRefused
+from cosmic.frame.errors import CosmicError
 from cosmic.frame.job_queue import JobQueue
-from cosmic.frame.network.caller import Access
-from cosmic.frame.network.errors import Busy, CallRefused, RemoteDefect
+from cosmic.frame.network.caller import MOVE_LIMIT_S, Access
+from cosmic.frame.network.errors import Busy
 from cosmic.frame.network.host import Host
 from cosmic.frame.network.lease import LeaseState
 from cosmic.frame.network.refusals import RefusalCount
@@ -55,20 +65,6 @@ MCP_WAIT_S: Final = 20.0
 FIRST_WORD_S: Final = 3.0
 MOST_OPERATIONS: Final = 256
 SLOWED_AFTER: Final = 20
-
-
-class HttpError(Exception):
-    """An answer that is an error.
-
-    Parameters
-    ----------
-    status : int
-        Of HTTP.
-    """
-
-    def __init__(self, status: int, text: str) -> None:
-        super().__init__(text)
-        self.status = status
 
 
 @dataclass
@@ -92,6 +88,13 @@ class _User:
             if len(self.operations) > MOST_OPERATIONS:
                 del self.operations[old]
         return number
+
+    def going_on(self, number: str) -> Operation[Any]:
+        """Return an operation by its number; raises `HttpError`."""
+        found = self.operations.get(number)
+        if found is None:
+            raise HttpError(404, f"there is no operation {number[:20]!r}")
+        return found
 
     def admit(self, now_s: float) -> bool:
         """Take note of a request; False where there were too many."""
@@ -208,14 +211,14 @@ class HttpGateway:
                 found: Response = await answer(request, user)
                 return found
             except HttpError as exc:
-                return _refusal(exc.status, "HttpError", str(exc))
+                return refusal_of(exc.status, "HttpError", str(exc))
             except CosmicError as exc:
-                return _answer_of(exc)
+                return answer_of(exc)
             except ClientDisconnect:
                 return Response(status_code=400)
             except Exception as exc:  # noqa: BLE001 - a defect: told, and the others go on
                 failure = self._station.policy.report(exc, f"HTTP {request.url.path[:100]}")
-                return _refusal(500, "RemoteDefect", failure.text)
+                return refusal_of(500, "RemoteDefect", failure.text)
 
         return guarded
 
@@ -266,18 +269,24 @@ class HttpGateway:
         )
 
     async def _control(self, request: Request, user: _User) -> Response:
-        take = request.method == "POST"
-        await self._job(
-            "stops", user.session.take_control if take else user.session.release_control, "control"
-        )
+        longest_s = self._settings.keep_control_s
+        keep_s = seconds_of(request, "keep", MOVE_LIMIT_S, longest_s)
+        keep = max(keep_s, MOVE_LIMIT_S) if request.method == "POST" else None
+        return JSONResponse(to_json(await self._controlled(user, keep)))
+
+    async def _controlled(self, user: _User, keep_s: float | None) -> object:
+        """Take the right to move for so much silence, or give it back for None."""
+        if keep_s is None:
+            await self._job("stops", user.session.release_control, "control")
+        else:
+            take = partial(user.session.take_control, keep_s=keep_s)
+            await self._job("stops", take, "control")
         state: LeaseState = self._station.lease.state
-        return JSONResponse({"in_control": user.session.in_control, "control": to_json(state)})
+        return {"in_control": user.session.in_control, "control": state}
 
     async def _operation(self, request: Request, user: _User) -> Response:
         number = request.path_params["number"]
-        found = user.operations.get(number)
-        if found is None:
-            raise HttpError(404, f"there is no operation {number[:20]!r}")
+        found = user.going_on(number)
         if request.method == "DELETE":
             found.cancel()
         return await self._going_on(request, user, number, found)
@@ -285,7 +294,9 @@ class HttpGateway:
     async def _going_on(
         self, request: Request, user: _User, number: str, operation: Operation[Any]
     ) -> Response:
-        await self._watched(request, user, operation, _seconds(request, "wait", 0.0))
+        await self._watched(
+            request, user, operation, seconds_of(request, "wait", 0.0, LONGEST_WAIT_S)
+        )
         if not operation.done:
             progress = operation.progress
             shown = {
@@ -298,7 +309,7 @@ class HttpGateway:
             return JSONResponse(shown, 202)
         failure = operation.failure
         if failure is not None:
-            return _answer_of(failure)
+            return answer_of(failure)
         result = to_json(operation.result)
         return JSONResponse({"operation": number, "done": True, "result": result})
 
@@ -309,7 +320,7 @@ class HttpGateway:
         until_s = WALL.now_s() + wait_s
         while not operation.done and WALL.now_s() < until_s:
             left_s = min(BEAT_S, until_s - WALL.now_s())
-            await _ended(operation, max(left_s, 0.001))
+            await ended(operation, max(left_s, 0.001))
             if await request.is_disconnected():
                 operation.cancel()
                 raise HttpError(400, "hung up")
@@ -320,7 +331,7 @@ class HttpGateway:
     async def _command(self, request: Request, user: _User) -> Response:
         application = request.path_params["application"]
         function, keys = self._address(application, request.path_params["path"])
-        arguments = await _body(request)
+        arguments = await body_of(request)
         order = user.session.order(application, function, arguments, keys)
         queue = "stops" if order.found.mark.at_once else application
         result = await self._carried_out(request, user, order, queue)
@@ -336,19 +347,28 @@ class HttpGateway:
             queue = "stops" if order.found.mark.at_once else application
             result = await self._carried_out(request, user, order, queue)
             if isinstance(result, Operation):
-                await self._watched(request, user, result, MCP_WAIT_S)
-                if not result.done:
-                    return {"goes_on": result.title, "text": result.progress.text}
-                return result.result
+                return await follow(user.keep(result), MCP_WAIT_S, False)
             return result
 
-        async def look(application: str, path: str) -> object:
-            try:
-                return await self._looked_up(application, [one for one in path.split("/") if one])
-            except HttpError as exc:
-                raise LookupError(str(exc)) from exc
+        async def follow(number: str, wait_s: float, cancel: bool) -> object:
+            found = user.going_on(number)
+            if cancel:
+                found.cancel()
+            await self._watched(request, user, found, min(wait_s, LONGEST_WAIT_S))
+            if not found.done:
+                said = {"operation": number, "goes_on": found.title}
+                return said | {"text": found.progress.text}
+            return found.result
 
-        answer = await self._tools.answer(await _body(request), call, look)
+        async def look(application: str, path: str) -> object:
+            return await self._looked_up(application, [one for one in path.split("/") if one])
+
+        async def control(keep_s: float | None) -> object:
+            longest_s = self._settings.keep_control_s
+            return await self._controlled(user, keep_s and min(max(keep_s, 1.0), longest_s))
+
+        uses = McpUses(call, look, control, follow)
+        answer = await self._tools.answer(await body_of(request), uses)
         return Response(status_code=202) if answer is None else JSONResponse(answer)
 
     async def _carried_out(self, request: Request, user: _User, order: Order, queue: str) -> object:
@@ -408,7 +428,7 @@ class HttpGateway:
         job = self._queues[queue].submit(action, title)
         until_s = WALL.now_s() + 10.0
         while not job.done and WALL.now_s() < until_s:
-            await _ended(job, 1.0)
+            await ended(job, 1.0)
         return job.result
 
     # Images and files
@@ -456,7 +476,7 @@ class HttpGateway:
         user: _User | None = None
         ends: list[Unfollow] = []
         try:
-            first = await asyncio.wait_for(_word(socket_), FIRST_WORD_S)
+            first = await asyncio.wait_for(word_of(socket_), FIRST_WORD_S)
             user = self._user_of(str(first.get("token", "")))
             if user is None:
                 await socket_.close(4401, 'the first message is {"token": ...}')
@@ -467,7 +487,7 @@ class HttpGateway:
             try:
                 await self._follow(first, line, ends)
                 while True:
-                    await self._follow(await _word(socket_), line, ends)
+                    await self._follow(await word_of(socket_), line, ends)
             finally:
                 line.end()
                 sending.cancel()
@@ -487,7 +507,7 @@ class HttpGateway:
         if user is None:
             return
         user.lines -= 1
-        if user.lines == 0:
+        if user.lines == 0 and not user.session.may_be_silent:
             user.session.lose_motion(f"{user.settings.name} hung up")
 
     async def _follow(
@@ -518,67 +538,3 @@ def _part(kind: type[Declared], name: str) -> tuple[type[Declared], bool]:
         there = ", ".join(declaration_of(kind).parts) or "none"
         raise HttpError(404, f"there is no part {name[:40]!r}; there are {there}")
     return found.kind, found.keyed
-
-
-async def _ended(operation: Operation[Any], wait_s: float) -> None:
-    """Wait until an operation has ended, at most so long; it goes on whoever is cancelled."""
-    loop, ended = asyncio.get_running_loop(), asyncio.Event()
-
-    def wake(_operation: object) -> None:
-        with suppress(RuntimeError):
-            loop.call_soon_threadsafe(ended.set)
-
-    operation.add_callback(wake)
-    with suppress(TimeoutError):
-        await asyncio.wait_for(ended.wait(), wait_s)
-
-
-async def _body(request: Request) -> dict[str, Any]:
-    said = bytearray()
-    async for piece in request.stream():
-        said += piece
-        if len(said) > BODY_LIMIT_BYTES:
-            raise HttpError(413, f"a command has at most {BODY_LIMIT_BYTES} bytes")
-    return _object(bytes(said) or b"{}")
-
-
-async def _word(socket_: WebSocket) -> dict[str, Any]:
-    return _object((await socket_.receive_text()).encode())
-
-
-def _object(said: bytes) -> dict[str, Any]:
-    try:
-        found = json.loads(said)
-    except (ValueError, RecursionError) as exc:
-        raise HttpError(400, f"what came is no JSON: {str(exc)[:100]}") from exc
-    if not isinstance(found, dict):
-        raise HttpError(400, "arguments are a JSON object, by their names")
-    return found
-
-
-def _seconds(request: Request, name: str, default: float) -> float:
-    text = request.query_params.get(name)
-    try:
-        value = default if text is None else float(text)
-    except ValueError:
-        value = float("nan")
-    if not 0.0 <= value <= LONGEST_WAIT_S:
-        raise HttpError(400, f"{name}: a number of seconds up to {LONGEST_WAIT_S:g}")
-    return value
-
-
-_STATUS: Final = ((MoveRefused, 409), (Busy, 503), (CallRefused, 400), (RemoteDefect, 500))
-
-
-def _answer_of(error: Exception) -> Response:
-    status = next((code for kind, code in _STATUS if isinstance(error, kind)), 422)
-    verdict = to_json(error.verdict) if isinstance(error, MoveRefused) else None
-    return _refusal(status, type(error).__name__, str(error), verdict)
-
-
-def _refusal(status: int, kind: str, text: str, verdict: object = None) -> Response:
-    error: dict[str, object] = {"kind": kind, "text": text[:2000]}
-    if verdict is not None:
-        error["verdict"] = verdict
-    headers = {"WWW-Authenticate": "Bearer"} if status == 401 else None
-    return JSONResponse({"error": error}, status, headers)

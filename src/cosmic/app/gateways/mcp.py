@@ -2,9 +2,12 @@
 
 import json
 from collections.abc import Awaitable, Callable, Iterable, Mapping
+from dataclasses import dataclass
+from math import inf
 from typing import Any, Final
 
 from cosmic.app.gateways.catalogue import Command, commands_of
+from cosmic.app.gateways.http_answers import HttpError
 from cosmic.app.gateways.openapi import key_name, mcp_tools, tool_name
 from cosmic.app.gateways.plain import to_json
 from cosmic.frame.declaration import Declared
@@ -12,7 +15,8 @@ from cosmic.frame.errors import CosmicError
 from cosmic.frame.network.errors import CallRefused
 from cosmic.frame.version import __version__
 
-STATE_TOOL: Final = "read_state"
+USUAL_KEEP_S: Final = 30.0
+"""So much silence a program bears that takes the right to move: it thinks between two calls."""
 PROTOCOL: Final = "2025-06-18"
 _NO_METHOD: Final = -32601
 _BAD_PARAMS: Final = -32602
@@ -24,22 +28,35 @@ Call = Callable[[str, str, dict[str, Any], tuple[str, ...]], Awaitable[object]]
 Look = Callable[[str, str], Awaitable[object]]
 """`look(application, path)` returns the state of an application, or one value of it."""
 
+Control = Callable[[float | None], Awaitable[object]]
+"""`control(keep_s)` takes the right to move for so much silence, or gives it back for None."""
+
+Follow = Callable[[str, float, bool], Awaitable[object]]
+"""`follow(operation, wait_s, cancel)` awaits the end of what goes on, or says that it goes on."""
+
+
+@dataclass(frozen=True, slots=True)
+class McpUses:
+    """What tools are carried out by; each may raise `CosmicError` or `HttpError`."""
+
+    call: Call
+    look: Look
+    control: Control
+    follow: Follow
+
 
 class McpTools:
-    """Answers the messages of MCP; each command is a tool, and one reads the state."""
+    """Answers the messages of MCP: each command is a tool; others read, take control and wait."""
 
     def __init__(self, kinds: Mapping[str, type[Declared]]) -> None:
-        self._kinds = tuple(kinds)
-        self._tools = [_state_tool(kinds), *mcp_tools(kinds)]
+        self._tools = [*_fixed_tools(kinds), *mcp_tools(kinds)]
         self._commands: dict[str, Command] = {
             tool_name(each): each
             for name, kind in kinds.items()
             for each in commands_of(name, kind)
         }
 
-    async def answer(
-        self, message: Mapping[str, Any], call: Call, look: Look
-    ) -> dict[str, Any] | None:
+    async def answer(self, message: Mapping[str, Any], uses: McpUses) -> dict[str, Any] | None:
         """Return the answer to a message; None to one that wants none."""
         number, method = message.get("id"), message.get("method")
         if message.get("jsonrpc") != "2.0" or not isinstance(method, str):
@@ -56,28 +73,31 @@ class McpTools:
         if method == "tools/list":
             return _result(number, {"tools": self._tools})
         if method == "tools/call":
-            if parameters.get("name") == STATE_TOOL:
-                return await self._looked(number, parameters.get("arguments"), look)
-            return await self._called(number, parameters, call)
+            name, given = str(parameters.get("name", "")), parameters.get("arguments", {})
+            if not isinstance(given, dict):
+                return _error(number, _BAD_PARAMS, "arguments are an object")
+            if name in _FIXED:
+                return await self._done(number, name, given, uses)
+            return await self._called(number, name, given, uses.call)
         return _error(number, _NO_METHOD, f"there is no method {method[:40]!r}")
 
-    async def _looked(self, number: object, given: object, look: Look) -> dict[str, Any]:
-        wanted = given if isinstance(given, dict) else {}
-        application, path = wanted.get("application"), wanted.get("path", "")
-        if application not in self._kinds or not isinstance(path, str):
-            return _error(number, _BAD_PARAMS, f"application is one of {', '.join(self._kinds)}")
+    async def _done(
+        self, number: object, name: str, given: Mapping[str, Any], uses: McpUses
+    ) -> dict[str, Any]:
+        """Carry out a tool that is no command of an application."""
         try:
-            found = await look(application, path)
-        except LookupError as exc:
+            result = await _FIXED[name](given, uses)
+        except (HttpError, TypeError, ValueError) as exc:
             return _error(number, _BAD_PARAMS, str(exc)[:1000])
-        return _result(number, _said(json.dumps(to_json(found)), failed=False))
+        except CosmicError as exc:
+            return _result(number, _failed(exc))
+        return _result(number, _said(json.dumps(to_json(result)), failed=False))
 
     async def _called(
-        self, number: object, parameters: Mapping[str, Any], call: Call
+        self, number: object, name: str, given: Mapping[str, Any], call: Call
     ) -> dict[str, Any]:
-        found = self._commands.get(str(parameters.get("name", "")))
-        given = parameters.get("arguments", {})
-        if found is None or not isinstance(given, dict):
+        found = self._commands.get(name)
+        if found is None:
             return _error(number, _BAD_PARAMS, "there is no such tool")
         arguments, keys = dict(given), []
         for part, keyed in zip(found.place.parts, found.place.keyed, strict=True):
@@ -88,25 +108,103 @@ class McpTools:
         except CallRefused as exc:
             return _error(number, _BAD_PARAMS, str(exc)[:1000])
         except CosmicError as exc:
-            return _result(number, _said(f"{type(exc).__name__}: {exc}"[:1000], failed=True))
+            return _result(number, _failed(exc))
         return _result(number, _said(json.dumps(to_json(result)), failed=False))
 
 
-def _state_tool(kinds: Iterable[str]) -> dict[str, Any]:
-    return {
-        "name": STATE_TOOL,
-        "title": "Read the state of an application",
-        "description": "The state of an application, or one value of it by its path.",
-        "inputSchema": {
-            "type": "object",
-            "properties": {
+async def _look(given: Mapping[str, Any], uses: McpUses) -> object:
+    return await uses.look(str(given.get("application", "")), str(given.get("path", "")))
+
+
+async def _take(given: Mapping[str, Any], uses: McpUses) -> object:
+    keep_s = float(given.get("keep_s", USUAL_KEEP_S))
+    if not 1.0 <= keep_s < inf:
+        raise ValueError("keep_s: a number of seconds from 1 on")
+    return await uses.control(keep_s)
+
+
+async def _release(_given: Mapping[str, Any], uses: McpUses) -> object:
+    return await uses.control(None)
+
+
+async def _follow(given: Mapping[str, Any], uses: McpUses) -> object:
+    wait_s = float(given.get("wait_s", 20.0))
+    if not 0.0 <= wait_s < inf:
+        raise ValueError("wait_s: a number of seconds")
+    return await uses.follow(str(given.get("operation", "")), wait_s, given.get("end") is True)
+
+
+_FIXED: Final[Mapping[str, Callable[[Mapping[str, Any], McpUses], Awaitable[object]]]] = {
+    "read_state": _look,
+    "take_control": _take,
+    "release_control": _release,
+    "follow_operation": _follow,
+}
+
+
+def _fixed_tools(kinds: Iterable[str]) -> list[dict[str, Any]]:
+    seconds = {"type": "number", "minimum": 0}
+    return [
+        _tool(
+            "read_state",
+            "Read the state of an application",
+            "The state of an application, or one value of it by its path.",
+            {
                 "application": {"enum": list(kinds)},
                 "path": {"type": "string", "description": 'Such as "axes/left.x".'},
             },
-            "required": ["application"],
+            ("application",),
+            reads=True,
+        ),
+        _tool(
+            "take_control",
+            "Take the right to move",
+            "One program at a time moves things. The right is kept for keep_s seconds after your "
+            "last call, at most as long as the platform allows; then what moves for you ends. Call "
+            "it again, or any other tool, before. Jogs end after 0.3 s in any case.",
+            {"keep_s": {**seconds, "default": USUAL_KEEP_S}},
+        ),
+        _tool(
+            "release_control",
+            "Give the right to move back",
+            "What moves for you stops. Do so when you have finished.",
+            {},
+        ),
+        _tool(
+            "follow_operation",
+            "Wait for what goes on",
+            "The result of an operation that another tool began, or how far it is after wait_s "
+            "seconds. With end, it is ended.",
+            {
+                "operation": {"type": "string"},
+                "wait_s": {**seconds, "default": 20, "maximum": 60},
+                "end": {"type": "boolean", "default": False},
+            },
+            ("operation",),
+        ),
+    ]
+
+
+def _tool(
+    name: str,
+    title: str,
+    text: str,
+    properties: Mapping[str, Any],
+    required: tuple[str, ...] = (),
+    *,
+    reads: bool = False,
+) -> dict[str, Any]:
+    return {
+        "name": name,
+        "title": title,
+        "description": text,
+        "inputSchema": {
+            "type": "object",
+            "properties": dict(properties),
+            "required": list(required),
             "additionalProperties": False,
         },
-        "annotations": {"readOnlyHint": True, "destructiveHint": False, "openWorldHint": False},
+        "annotations": {"readOnlyHint": reads, "destructiveHint": False, "openWorldHint": False},
     }
 
 
@@ -115,7 +213,7 @@ _WELCOME: Final = {
     "capabilities": {"tools": {}},
     "serverInfo": {"name": "CoSMic", "version": __version__},
     "instructions": "Commands of a microrobotic platform. What moves needs the right to move "
-    "(POST /api/control), and is refused with its reason by the gate.",
+    "(take_control), and is refused with its reason by the gate.",
 }
 
 
@@ -125,6 +223,10 @@ def _result(number: object, result: Mapping[str, Any]) -> dict[str, Any]:
 
 def _error(number: object, code: int, text: str) -> dict[str, Any]:
     return {"jsonrpc": "2.0", "id": number, "error": {"code": code, "message": text}}
+
+
+def _failed(error: CosmicError) -> dict[str, Any]:
+    return _said(f"{type(error).__name__}: {error}"[:1000], failed=True)
 
 
 def _said(text: str, *, failed: bool) -> dict[str, Any]:

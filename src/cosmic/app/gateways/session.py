@@ -10,7 +10,7 @@ from threading import Lock
 from typing import Any, Final
 
 from cosmic.app.gateways.plain import from_json
-from cosmic.frame.network.caller import Access, Caller
+from cosmic.frame.network.caller import MOVE_LIMIT_S, Access, Caller
 from cosmic.frame.network.errors import CallRefused
 from cosmic.frame.network.host import KEYS, NUMBER
 from cosmic.frame.network.lease import LeaseState
@@ -71,6 +71,7 @@ class GatewaySession:
         self._station = station
         self._caller = Caller(name, secrets.token_hex(16), access, door=door)
         self._approve = approve
+        self._keep_s = MOVE_LIMIT_S
         self._numbers = count(1)
         self._lock = Lock()
         self._operations: OrderedDict[str, Operation[Any]] = OrderedDict()
@@ -88,13 +89,20 @@ class GatewaySession:
         """It holds the right to move."""
         return self._station.lease.holds(self._caller.token)
 
-    def take_control(self, *, in_process: bool = False) -> None:
+    @property
+    def may_be_silent(self) -> bool:
+        """It asked to keep the right to move longer than signs of life are apart."""
+        return self._keep_s > MOVE_LIMIT_S
+
+    def take_control(self, *, in_process: bool = False, keep_s: float = MOVE_LIMIT_S) -> None:
         """Take the right to move, or keep it.
 
         Parameters
         ----------
         in_process : bool
             Whoever calls sees to it by itself that the program is alive.
+        keep_s : float
+            How long the program may be silent.
 
         Raises
         ------
@@ -105,7 +113,9 @@ class GatewaySession:
         """
         if self._caller.access < Access.MOVE:
             raise CallRefused(f"{self.name} may not move anything")
-        self._station.lease.take(self.name, self._caller.token, in_process=in_process)
+        token = self._caller.token
+        self._station.lease.take(self.name, token, in_process=in_process, keep_s=keep_s)
+        self._keep_s = keep_s
         self.beat()
 
     def release_control(self) -> None:
@@ -213,7 +223,8 @@ class GatewaySession:
 
     def _on_event(self, event: list[object]) -> None:
         number, progress, done, result, error = event
-        followed = self._followed(str(number))
+        title = progress.title if isinstance(progress, Progress) else ""
+        followed = self._followed(str(number), title)  # it may come before the answer does
         if not done:
             if isinstance(progress, Progress):
                 followed.report(progress.fraction, progress.text)

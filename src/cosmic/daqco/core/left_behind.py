@@ -26,6 +26,7 @@ from cosmic.daqco.core.unclosed_file import (
     closed_head,
     is_recent,
     is_unclosed,
+    missing_bytes,
 )
 from cosmic.frame.errors import RecordingError
 from cosmic.frame.kept_file import toml_lines, write_whole
@@ -102,16 +103,26 @@ def close_left_open(path: Path, *, trusted: bool = False) -> Closing:
 
 def _check_is_recording(path: Path, file: h5py.File) -> None:
     if file.attrs.get("format") != form.FORMAT:
-        raise RecordingError(
+        raise _cut_off(path) or RecordingError(
             f"{path}: is an HDF5 file, but no recording by CoSMic; nothing was changed. HDF5's own "
             "h5clear --status closes such files"
         )
 
 
 def _broken(path: Path, exc: Exception) -> RecordingError:
-    return RecordingError(
+    return _cut_off(path) or RecordingError(
         f"{path}: cannot be read ({form.reason(exc)}); it is damaged beyond what can be mended, "
         "and nothing was changed. Look for a copy"
+    )
+
+
+def _cut_off(path: Path) -> RecordingError | None:
+    missing = missing_bytes(path)
+    if not missing:
+        return None
+    return RecordingError(
+        f"{path}: is cut off, its last {missing} bytes are missing; it is damaged beyond what can "
+        "be mended, and nothing was changed. Look for a copy"
     )
 
 

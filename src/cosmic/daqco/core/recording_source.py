@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.daqco.core import recording_format as form
-from cosmic.daqco.core.unclosed_file import UnclosedFile, is_unclosed
+from cosmic.daqco.core.unclosed_file import UnclosedFile, is_unclosed, missing_bytes
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import RecordingError
 
@@ -45,7 +45,9 @@ def open_file(path: Path) -> h5py.File:
         file = h5py.File(path, "r", locking="best-effort")
     try:
         if file.attrs.get("format") != form.FORMAT:
-            raise RecordingError(f"{path}: is an HDF5 file, but no recording by CoSMic")
+            raise _cut_off(path) or RecordingError(
+                f"{path}: is an HDF5 file, but no recording by CoSMic"
+            )
     except Exception:
         file.close()
         raise
@@ -183,7 +185,7 @@ class RecordingSource:
         self.rate_hz = float(file.attrs["rate_hz"])
         self.channels: Table = file["channels"][:]
         self.names = tuple(form.decoded(each) for each in self.channels["name"])
-        self.complete = bool(file["complete"][()])
+        self.complete = bool(file["complete"][()]) and not missing_bytes(self.path)
         # Backwards: what a row of `chunks` speaks of was written before it.
         self.tables: dict[str, Table] = {
             # Files of before lack some tables.
@@ -215,7 +217,17 @@ class RecordingSource:
                 raise ValueError(f"a scale of {self.names[channel]} is missing")
 
     def _broken(self, exc: Exception) -> RecordingError:
-        return RecordingError(
+        return _cut_off(self.path) or RecordingError(
             f"{self.path}: cannot be read ({form.reason(exc)}); it is no recording, or damaged "
             "beyond what its writer could prevent. Look for a copy"
         )
+
+
+def _cut_off(path: Path) -> RecordingError | None:
+    missing = missing_bytes(path)
+    if not missing:
+        return None
+    return RecordingError(
+        f"{path}: is cut off, its last {missing} bytes are missing. Run cosmic repair {path}, or "
+        "look for a copy"
+    )

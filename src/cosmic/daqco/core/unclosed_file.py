@@ -34,13 +34,24 @@ def is_unclosed(path: Path) -> bool:
     OSError
         It cannot be read.
     """
+    head, size = _looked_at(path)
+    return is_recent(head) and (head[FLAGS_AT] != 0 or _end(head) > size)
+
+
+def missing_bytes(path: Path) -> int:
+    """Return how many bytes at least an HDF5 file has lost with its end; raises `OSError`."""
+    head, size = _looked_at(path)
+    return max(_end(head) - size, 0) if is_recent(head) else 0
+
+
+def _looked_at(path: Path) -> tuple[bytes, int]:
     with path.open("rb") as file:
-        head = file.read(LENGTH)
-        size = file.seek(0, os.SEEK_END)
-    if not is_recent(head):
-        return False
+        return file.read(LENGTH), file.seek(0, os.SEEK_END)
+
+
+def _end(head: bytes) -> int:
     (end,) = struct.unpack_from("<Q", head, END_AT)
-    return head[FLAGS_AT] != 0 or end > size
+    return int(end)
 
 
 class UnclosedFile(io.RawIOBase):

@@ -32,6 +32,18 @@ class Pulse:
             if not self._why and sent_s <= self._clock.now_s():
                 self._last_s = max(self._last_s, sent_s)
 
+    def bear(self, limit_s: float) -> None:
+        """Bear `limit_s` of silence from now on."""
+        with self._lock:
+            self._look(self._limit_s)
+            self._limit_s = limit_s
+
+    @property
+    def limit_s(self) -> float:
+        """How much silence it bears."""
+        with self._lock:
+            return self._limit_s
+
     def end(self, why: str) -> None:
         """End it for good."""
         with self._lock:

@@ -97,13 +97,18 @@ class StationLease:
         notify(listener, self.state)
         return end
 
-    def take(self, name: str, token: str, *, in_process: bool = False) -> None:
+    def take(
+        self, name: str, token: str, *, in_process: bool = False, keep_s: float = MOVE_LIMIT_S
+    ) -> None:
         """Give it to the session `token`, or leave it there.
 
         Parameters
         ----------
         in_process : bool
             The session lives and dies with this process, and so sends no signs of life.
+        keep_s : float
+            Silence that ends it and what moves by it. A motion without an end of its own bears no
+            more than before.
 
         Raises
         ------
@@ -117,12 +122,18 @@ class StationLease:
                 raise refusal(_refused(f"{self._local.name} keeps the right to move to itself"))
             if held is not None and not secrets.compare_digest(held.token, token):
                 raise refusal(_refused(f"the right to move is held by {held.name}"))
+            limit_s = float("inf") if in_process else keep_s
+            changed = held is None or held.pulse.limit_s != limit_s
             if held is None:
-                limit_s = float("inf") if in_process else MOVE_LIMIT_S
                 pulse = Pulse(name, limit_s=limit_s, clock=self._clock)
                 self._grant = _Grant(name, token, pulse, in_process)
-                self._why = f"taken by {name}"
-        if held is None:
+            else:
+                held.pulse.bear(limit_s)
+            if changed:
+                kept = MOVE_LIMIT_S < limit_s < float("inf")
+                silence = f", who may be silent for {limit_s:g} s" if kept else ""
+                self._why = f"taken by {name}{silence}"
+        if changed:
             self._publish()
 
     def release(self, token: str, why: str = "") -> None:
@@ -175,7 +186,10 @@ class StationLease:
             if not secrets.compare_digest(held.token, token):
                 advice = TAKE_IT if self._grant is None and self._offered else ""
                 raise refusal(_refused(f"the right to move is held by {held.name}", advice))
-        return DeadMan(held.pulse, float("inf") if held.in_process else limit_s)
+        if held.in_process:
+            return DeadMan(held.pulse, float("inf"))
+        longer = limit_s >= MOVE_LIMIT_S  # what is shorter has no end of its own: a jog
+        return DeadMan(held.pulse, max(held.pulse.limit_s, limit_s) if longer else limit_s)
 
     def poll(self) -> None:
         """Let it lapse if its holder has fallen silent."""
