@@ -21,6 +21,8 @@ from cosmic.vico.core.pixel_map import Floats
 TANGENT_UM: Final = 120.0
 """Length to both sides of the jaws' tip from which the direction there is taken."""
 STEP_UM: Final = 5.0
+SLOPE_UM: Final = 20.0
+"""To both sides, from where a slope is taken."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +48,11 @@ class HeldShape:
     def bow_um(self, ahead_um: float) -> float:
         """Return how far in y the fibre is from straight ahead, so far from the jaws."""
         return float(np.interp(ahead_um, self.ahead_um, self.aside_um))
+
+    def slope_at(self, ahead_um: float) -> float:
+        """Return how steep the fibre is there, as a tangent."""
+        near = self.bow_um(ahead_um + SLOPE_UM) - self.bow_um(ahead_um - SLOPE_UM)
+        return near / (2.0 * SLOPE_UM)
 
     def gentle_um(self, steepest_deg: float) -> float:
         """Return how far ahead of the jaws the fibre slopes less than so much."""

@@ -7,6 +7,7 @@ from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.handling.plate import Reach
 from cosmic.autonomy.handling.sight import SeenFibre
+from cosmic.autonomy.handling.surface import Contact
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats
@@ -42,8 +43,8 @@ class HeldFibre:
         It is the standard: it is put back where it lay.
     measured : MeasuredFibre or None
         Its spans as they were fitted, each by itself.
-    contacts : list of (float, float)
-        Where along it, from the jaws, the probe has met it, and how far from where foreseen.
+    contacts : list of Contact
+        Where the probe has met it in this grip.
     """
 
     number: int
@@ -56,7 +57,7 @@ class HeldFibre:
     tries: int = 0
     shift_um: float = 0.0
     held: bool = False
-    contacts: list[tuple[float, float]] = field(default_factory=list)
+    contacts: list[Contact] = field(default_factory=list)
     zero_un: float | None = None
     tilts: int = 0
     looks: int = 0

@@ -26,6 +26,7 @@ from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.prepare import retract_probe
 from cosmic.autonomy.handling.retrying_move import RetryingMove
 from cosmic.autonomy.handling.settings import StandardSettings
+from cosmic.autonomy.handling.surface import Contact, foresee_off
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Yielded
 from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.errors import DeviceError, NotAvailable
@@ -103,8 +104,10 @@ LIMIT_PART: Final = 0.4
 """Of the force limit: what one step of the search may add at most."""
 GUESS_TIMES: Final = 1.6
 """So much stiffer than guessed a fibre may be at a span."""
-LINE_FROM: Final = 2
-"""Contacts from which the next is foreseen."""
+SURE_TIMES: Final = 3.0
+"""The probe comes near a fibre at once but for so many standard deviations of where that is."""
+MET_STD_UM: Final = 0.7
+"""Of the contact that the rise of a push leads back to."""
 GROWTH: Final = 1.5
 """How much more than the step before one step may add, when the next is foreseen."""
 
@@ -141,6 +144,7 @@ class OneSpan:
         self._probe = work.probe
         self._points = _Points()
         self._shape = shape_of(work, fibre)
+        self._slope = self._shape.slope_at(plan.span_um)
         # The probe pushes along its own direction; way grows as it does.
         self._sign = 1.0 if work.probe.forward[1] > 0.0 else -1.0
 
@@ -150,6 +154,7 @@ class OneSpan:
         base = yield from self._baseline()
         contact = yield from self._search(base)
         yield from self._out(base, contact)
+        self._place_contact(contact)
         yield from self._dwell()
         yield from self._back(contact)
         self._keep()
@@ -160,18 +165,10 @@ class OneSpan:
     def _to_travel(self, way_um: float) -> RetryingMove:
         return self._work.go({self._probe.y_axis: self._sign * way_um - self._probe.tip_um[1]})
 
-    def _surface_um(self) -> float:
-        """Return the way at which the probe should meet the fibre: as it bows, as it was met."""
-        if not self._fibre.contacts:
-            return self._foreseen_um()
-        # It lies elsewhere than foreseen because of where it is held, or of how it bows. Two
-        # contacts tell both apart; with one the probe comes up as if to the nearer.
-        if len(self._fibre.contacts) >= LINE_FROM:
-            (far, far_off), (near, near_off) = self._fibre.contacts[-LINE_FROM:]
-            slope = (far_off - near_off) / (far - near) if far > near else 0.0
-            return self._foreseen_um() + near_off + slope * (self._plan.span_um - near)
-        along, off = self._fibre.contacts[-1]
-        return self._foreseen_um() + min(off, off * (self._plan.span_um / along) ** 2)
+    def _surface_um(self) -> tuple[float, float]:
+        """Return the way at which the probe should meet the fibre, and how sure that is."""
+        off, std = foresee_off(self._fibre.contacts, self._plan.span_um, self._slope)
+        return self._foreseen_um() + off, std
 
     def _foreseen_um(self) -> float:
         _, hold_y = self._work.tip_now(self._work.gripper)
@@ -184,7 +181,7 @@ class OneSpan:
         hold_x, _ = work.tip_now(work.gripper)
         off_x, _ = work.calibration.probe_off_um
         x = hold_x + work.jaws.forward * self._plan.span_um - off_x
-        surface, known = self._surface_um(), bool(self._fibre.contacts)
+        surface, std = self._surface_um()
         bow = abs(self._shape.bow_um(self._plan.span_um))
         aside = surface - push.stand_off_um - push.bow_part * bow
         _, y = work.tip_now(self._probe)
@@ -197,8 +194,9 @@ class OneSpan:
             part = self._plan.span_um / push.tilt_longest_um
             side = -1.0 if self._fibre.tilts % 2 else 1.0
             yield work.go_up(work.hold_tip_um + side * push.tilt_um * part)
-        for travel in (aside, surface - push.retreat_um) if known else (aside,):
-            yield from self._come_to(travel)
+        # Only where the fibre was met before is it known well enough to come nearer at once.
+        known = bool(self._fibre.contacts)
+        yield from self._come_to(surface - push.near_um - SURE_TIMES * std if known else aside)
 
     def _come_to(self, way_um: float) -> Steps:
         """Go there, and back again as long as something is felt that should not be there."""
@@ -246,19 +244,27 @@ class OneSpan:
     def _search(self, base_un: float) -> Generator[Yielded, object, float]:
         push, step = self._push, self._step_um()
         travel = self._points.way_um[-1]
-        end = self._surface_um() + push.search_um
+        end = self._surface_um()[0] + push.search_um
         while travel < end:
             before = travel
             travel, mean = yield from self._to(travel + step, push.search_average_s, loading=True)
             if mean.mean_un - base_un > push.contact_un:
-                off = 0.5 * (before + travel) - self._foreseen_um()
-                self._fibre.contacts.append((self._plan.span_um, off))
+                self._note_contact(0.5 * (before + travel), 0.5 * (travel - before))
                 return before
         raise OperationFailed(
             NO_CONTACT,
             f"the probe met nothing {push.search_um:g} um beyond where fibre "
             f"{self._fibre.number} should be, {self._plan.span_um:.0f} um from the jaws",
         )
+
+    def _note_contact(self, way_um: float, std_um: float) -> None:
+        off = way_um - self._foreseen_um()
+        self._fibre.contacts.append(Contact(self._plan.span_um, off, std_um, self._slope))
+
+    def _place_contact(self, free_um: float) -> None:
+        """Put right where the fibre was met: the rise of the force tells better than a step."""
+        self._fibre.contacts.pop()
+        self._note_contact(self._met_um(free_um), MET_STD_UM)
 
     def _out(self, base_un: float, contact_um: float) -> Steps:
         push, points = self._push, self._points

@@ -154,8 +154,10 @@ class PushSettings(StrictModel):
     stand_off_um, bow_part : float
         How far from where the fibre should be the probe begins to look for it; and a part of how
         far the fibre is foreseen to bow on top.
+    near_um : float
+        The same where it was met at another span, beyond what is unsure of the place.
     search_um : float
-        How far beyond that it looks.
+        How far beyond where the fibre should be it looks.
     search_step_um : float
         Largest step of the search; stiffer fibres and shorter spans make it smaller.
     stiffest_ei_n_m2 : float
@@ -195,6 +197,7 @@ class PushSettings(StrictModel):
     channel: str = "force"
     stand_off_um: float = Field(40.0, gt=0.0)
     bow_part: float = Field(0.3, ge=0.0)
+    near_um: float = Field(5.0, gt=0.0)
     search_um: float = Field(120.0, gt=0.0)
     search_step_um: float = Field(8.0, gt=0.0)
     stiffest_ei_n_m2: float = Field(4e-10, gt=0.0)

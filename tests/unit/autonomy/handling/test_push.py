@@ -84,7 +84,9 @@ class Daqco:
 class Bench(HandlingContext):
     """A fibre in the jaws, a probe, and the force of one on the other; no platform."""
 
-    def __init__(self, ei_n_m2: float, *, off_um: float = 0.0, there: bool = True) -> None:
+    def __init__(
+        self, ei_n_m2: float, *, off_um: float = 0.0, tilt: float = 0.0, there: bool = True
+    ) -> None:
         clock = ManualClock(auto_advance=True)
         settings = HandlingSettings(push=PushSettings(stop_un=140.0))
         bench: Any = self
@@ -98,6 +100,7 @@ class Bench(HandlingContext):
             "probe.y": 1000.0,
         }
         self.ei, self.off_um, self.there = ei_n_m2 * 1e18, off_um, there
+        self.tilt, self.at_once_un = tilt, 0.0
         self.peak_un, self.random = 0.0, np.random.default_rng(3)
         line = np.column_stack([np.linspace(0.0, 1200.0, 61), np.zeros(61)])
         reach = Reach(Candidate(line, 1200.0, WIDTH_UM, 0.0, 60.0), 0.0, line, (250.0, 0.0))
@@ -112,8 +115,11 @@ class Bench(HandlingContext):
 
     @override
     def go(self, targets: Any) -> Any:
+        before = self.at_um["probe.y"]
         self.at_um |= targets
-        self.force_un()
+        force = self.force_un()
+        if before - self.at_um["probe.y"] > 10.0:  # no step of a search is so long
+            self.at_once_un = max(self.at_once_un, force)
         return Done()
 
     def wanted(self, seconds: float, *, settle_s: float = 0.0) -> Done:
@@ -128,7 +134,7 @@ class Bench(HandlingContext):
     def force_un(self) -> float:
         """Return what the fibre pushes back with."""
         ahead = self.at_um["probe.x"] - 0.0
-        surface = self.at_um["left.y"] + WIDTH_UM / 2.0 + self.off_um
+        surface = self.at_um["left.y"] + WIDTH_UM / 2.0 + self.off_um + self.tilt * ahead
         way = surface - (5000.0 + self.at_um["probe.y"])
         if not (self.there and way > 0.0 and 0.0 < ahead < 950.0):
             return 0.0
@@ -168,6 +174,18 @@ def test_a_fibre_nearer_than_foreseen_is_come_up_to_again_from_further_back():
     assert bench.peak_un <= 0.8 * 180.0
     for span in bench.held_fibre().spans:
         assert span.force_un[0] == pytest.approx(ZERO_UN, abs=0.6), "each begins without contact"
+
+
+@pytest.mark.parametrize("ei_n_m2", [2e-11, 1.5e-10, 4e-10])
+@pytest.mark.parametrize("tilt", [-0.04, -0.011, 0.0, 0.013, 0.04])
+def test_a_fibre_that_was_met_is_never_run_into_at_the_next_span(ei_n_m2: float, tilt: float):
+    for off_um in (-11.0, -7.0, -3.0, 1.0, 5.0):
+        bench = Bench(ei_n_m2, off_um=off_um, tilt=tilt)
+        carried_out(PushSpans().run(bench))
+        assert bench.at_once_un == 0.0, off_um
+        # Nor is it looked for from far away: that takes long in the small steps of a short span.
+        for span in bench.held_fibre().spans[1:]:
+            assert np.sum(span.loading) < 45
 
 
 def test_a_fibre_that_is_not_there_is_reported_with_the_position():
