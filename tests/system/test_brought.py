@@ -190,9 +190,9 @@ def test_a_check_reads_the_options_of_all_that_is_named(
 
 
 def test_a_response_to_a_contact_needs_a_pair_that_is_watched(laboratory: Edit) -> None:
-    contact = '[[mico.contact]]\nbodies = ["left", "right"]\nresponse = "shrug"\n\n'
+    contact = '[[mico.contact]]\nbodies = ["left_jaw_a", "left_jaw_b"]\nresponse = "shrug"\n\n'
     folder = laboratory(("[[mico.group]]\n", f"{contact}[[mico.group]]\n"))
-    with pytest.raises(cosmic.ConfigError, match="left and right are not watched"):
+    with pytest.raises(cosmic.ConfigError, match="left_jaw_a and left_jaw_b are not watched"):
         cosmic.connect(folder, applications=("mico",))
 
 

@@ -53,7 +53,13 @@ def test_a_new_package_passes_its_tests_at_once(
 
 @pytest.mark.parametrize(
     ("name", "reason"),
-    [("My-Stage", "cannot be the name"), ("class", "cannot be the name"), ("scu3d", "already")],
+    [
+        ("My-Stage", "cannot be the name"),
+        ("class", "cannot be the name"),
+        ("cosmic", "name of a module already"),
+        ("queue", "name of a module already"),
+        ("scu3d", "already"),
+    ],
 )
 def test_a_name_that_cannot_be_is_refused(name: str, reason: str, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=reason):

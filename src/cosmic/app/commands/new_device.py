@@ -62,6 +62,8 @@ def write_package(kind: str, name: str, out: Path) -> Path:
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
         raise ConfigError(f"{name!r} cannot be the name of a package: small letters, digits and _")
+    if name == "cosmic" or name in sys.stdlib_module_names:
+        raise ConfigError(f"{name!r} is the name of a module already; choose another name")
     if name in names(KINDS[kind]):
         raise ConfigError(f"there is a {kind} {name!r} already; choose another name")
     dist = f"cosmic-{name.replace('_', '-')}"

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from cosmic.app.configuration.backends import named_backends
+from cosmic.app.configuration.listed import board_mistakes, twin_mistakes
 from cosmic.app.configuration.network import serving
 from cosmic.app.configuration.platform_file import (
     KNOWN_APPLICATIONS,
@@ -42,11 +43,15 @@ def find_mistakes(config: str | Path) -> list[str]:
         lines += kept_mistakes(file, path)
         lines += recipe_mistakes(file, path)
         lines += _network_mistakes(file, path)
-        lines += _backend_mistakes(file, path)
+        lines += _backend_mistakes(file, path) or [
+            f"{path}: {each}" for each in (*twin_mistakes(file), *board_mistakes(file))
+        ]
     if file is not None and twin is not None:
         lines += _twin_mistakes(file, path, twin, twin_path)
     if file is not None and file.platform.scene:
         lines += _scene_mistakes(file, path)
+    elif file is not None and file.mico.contact:
+        lines.append(f"{path}: mico.contact: needs a scene; name one in platform.scene")
     return lines
 
 

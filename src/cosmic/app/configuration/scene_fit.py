@@ -1,14 +1,16 @@
 """Whether a scene and the positioners of a platform fit together."""
 
 import logging
+from collections.abc import Iterator
 from pathlib import Path
 
 from cosmic.app.configuration.platform_file import PlatformFile
+from cosmic.frame.config import not_there
 from cosmic.frame.errors import ConfigError, NotAvailable, PluginError
 from cosmic.frame.plugins import Kind, make
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
 from cosmic.mico.core.collision.collision_manager import CollisionManager
-from cosmic.mico.core.collision.model import SceneModel, pair_of
+from cosmic.mico.core.collision.model import BodyPair, SceneModel, pair_of
 from cosmic.mico.core.settings import ContactSettings
 
 logger = logging.getLogger(__name__)
@@ -73,4 +75,21 @@ def misfits(file: PlatformFile, path: Path, scene: SceneModel) -> list[str]:
                     f"{where}.limits_{each.unit}: {each.limits[0]:g} to {each.limits[1]:g} reaches "
                     f"beyond the hard stops of {file.platform.scene}, {low:g} to {high:g}"
                 )
-    return lines
+    return [*lines, *_contact_mistakes(file, path, scene)]
+
+
+def _contact_mistakes(file: PlatformFile, path: Path, scene: SceneModel) -> Iterator[str]:
+    """Yield a line for each contact of bodies that are not watched, or that has two responses."""
+    watched = {pair.bodies for pair in scene.pairs}
+    seen: set[BodyPair] = set()
+    for index, each in enumerate(file.mico.contact):
+        where = f"{path}: mico.contact[{index}].bodies"
+        pair = pair_of(*each.bodies)
+        unknown = [body for body in each.bodies if body not in scene.bodies]
+        if unknown:
+            yield f"{where}: {not_there('body', unknown[0], scene.bodies)}"
+        elif pair not in watched:
+            yield f"{where}: {pair[0]} and {pair[1]} are not watched in {file.platform.scene}"
+        elif pair in seen:
+            yield f"{where}: {pair[0]} and {pair[1]} have a response already"
+        seen.add(pair)

@@ -174,6 +174,11 @@ class DaqcoSettings(StrictModel):
             for each in self.channel
             if each.scale not in known
         ]
+        wrong += [
+            f"driver {each.backend!r} is there twice with the same options, and so are its boards"
+            for index, each in enumerate(self.drivers)
+            if each in self.drivers[:index]
+        ]
         channels = [each.name for each in self.channel]
         wrong += [
             f"limit: {not_there('channel', each.channel, channels)}"

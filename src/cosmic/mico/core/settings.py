@@ -273,7 +273,14 @@ class MicoSettings(StrictModel):
 
     def _joined_wrongly(self) -> list[str]:
         missing = "serials: name all devices, so that none takes another's number"
-        return [missing] if self.controller and not self.serials else []
+        found = [(each.backend, each.library, each.options) for each in self.controllers]
+        twice = dict.fromkeys(
+            f"controller {backend!r} is there twice with the same options, and would be opened "
+            "twice: name all its serials in one place"
+            for index, (backend, library, options) in enumerate(found)
+            if (backend, library, options) in found[:index]
+        )
+        return [*([missing] if self.controller and not self.serials else []), *twice]
 
     @property
     def controllers(self) -> "tuple[MicoSettings | ControllerSettings, ...]":

@@ -164,6 +164,15 @@ class VicoSettings(StrictModel):
         for name, count in Counter(each.name for each in self.camera).items():
             if count > 1:
                 raise ValueError(f"two cameras are named {name!r}")
+        names: dict[tuple[str, str], str] = {}
+        for each in self.camera:
+            if each.key and (each.backend, each.key) in names:
+                other = names[each.backend, each.key]
+                raise ValueError(
+                    f"{other!r} and {each.name!r} are the same camera, {each.key!r} of "
+                    f"{each.backend!r}"
+                )
+            names[each.backend, each.key] = each.name
         for name, count in Counter(each.name for each in self.tool).items():
             if count > 1:
                 raise ValueError(f"two tools are named {name!r}")
