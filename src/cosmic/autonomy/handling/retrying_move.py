@@ -77,11 +77,29 @@ class RetryingMove:
         self._movement: Movement | None = None
         self._refusal: CosmicError | None = None
         self._cancelled = False
+        self._callbacks: list[Callable[[RetryingMove], object]] = []
         self._begin()
+
+    def add_callback(self, callback: Callable[["RetryingMove"], object]) -> None:
+        """Call `callback(self)` whenever it may have ended, in the thread that ends a movement."""
+        self._callbacks.append(callback)
+        self._hear()
+
+    def _hear(self) -> None:
+        """Hear of the end of the movement ordered last, where it can tell of that."""
+        add_callback = getattr(self._movement, "add_callback", None)
+        if add_callback is not None:
+            add_callback(self._on_end)
+
+    def _on_end(self, _movement: object) -> None:
+        for each in tuple(self._callbacks):
+            each(self)
 
     def _begin(self) -> None:
         try:
             self._movement = self._order()
+            if self._callbacks:
+                self._hear()
         except MoveRefused as refusal:
             if refusal.verdict.reason is not Reason.NO_ANSWER or self._unanswered <= 0:
                 raise

@@ -13,6 +13,7 @@ from cosmic.frame.errors import (
     DeviceTimeout,
     MoveRefused,
 )
+from cosmic.frame.operation import Operation
 from cosmic.frame.verdict import MoveVerdict, Reason
 
 
@@ -52,6 +53,28 @@ def refusing(reason: Reason, times: int) -> tuple[Callable[[], Moved], list[int]
 def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(retrying_move, "APART_WALL_S", 0.0)
     monkeypatch.setattr(retrying_move, "BUMP_WALL_S", 0.0)
+
+
+class Moving(Operation[str]):
+    """A movement on its way; the test ends it."""
+
+    def __init__(self) -> None:
+        super().__init__("move")
+
+
+def test_whoever_waits_hears_of_the_end_at_once_also_of_one_that_was_ordered_again():
+    orders = [Moving(), Moving()]
+    ordered = iter(orders)
+    move = RetryingMove(lambda: next(ordered), to_a_position=True)
+    heard: list[bool] = []
+    move.add_callback(lambda ended: heard.append(ended.done))
+    assert heard == []
+    orders[0].fail(DeviceTimeout("it has not come on"))
+    assert heard == [False]  # it is ordered again
+    assert not move.done
+    orders[1].finish("there")
+    assert heard == [False, True]
+    assert move.wait(0.0) == "there"
 
 
 def test_a_movement_without_an_answer_is_ordered_again_until_there_is_one():
