@@ -106,6 +106,17 @@ class ForceWatch:
             peak, self._peak_un = self._peak_un, 0.0
         return peak
 
+    def farthest_un(self, low_un: float, high_un: float) -> float | None:
+        """Return the newest reading that lies farthest beyond two bounds; None: none does."""
+        with self._changed:
+            if not self._chunks:
+                return None
+            chunk = self._chunks[-1]
+        values = chunk.values[chunk.channels.index(self._channel)]
+        low, high = float(values.min()), float(values.max())
+        beyond = high if high - high_un >= low_un - low else low
+        return None if low_un <= beyond <= high_un else beyond
+
     def subscribe(self, listener: Callable[[], object]) -> Unsubscribe:
         """Call `listener()` after each chunk; returns the function that ends it."""
         return self._taken.subscribe(listener)

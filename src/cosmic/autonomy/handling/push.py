@@ -19,13 +19,14 @@ from cosmic.autonomy.bending.fit import (
 from cosmic.autonomy.bending.plan import DRY_EI_N_M2, PlannedSpan, SpanLimits, guess_ei, plan_spans
 from cosmic.autonomy.bending.result import BendingError
 from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.handling.careful_move import CarefulMove
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.grasp import see_held, shape_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.prepare import retract_probe
 from cosmic.autonomy.handling.retrying_move import RetryingMove
-from cosmic.autonomy.handling.settings import StandardSettings
+from cosmic.autonomy.handling.settings import PushSettings, StandardSettings
 from cosmic.autonomy.handling.surface import Contact, foresee_off
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Yielded
 from cosmic.daqco.core.settings import LimitSettings
@@ -149,14 +150,25 @@ class OneSpan:
         self._sign = 1.0 if work.probe.forward[1] > 0.0 else -1.0
 
     def steps(self) -> Steps:
-        """Find the fibre, push it, let it go, and keep the span."""
-        yield from self._go_in_front()
-        base = yield from self._baseline()
-        contact = yield from self._search(base)
-        yield from self._out(base, contact)
-        self._place_contact(contact)
-        yield from self._dwell()
-        yield from self._back(contact)
+        """Find the fibre, push it, let it go, and keep the span.
+
+        Raises
+        ------
+        OperationFailed
+            It was not met, or more was felt than a push may; the probe is back from it then.
+        """
+        try:
+            yield from self._go_in_front()
+            base = yield from self._baseline()
+            contact = yield from self._search(base)
+            yield from self._out(base, contact)
+            self._place_contact(contact)
+            yield from self._dwell()
+            yield from self._back(contact)
+        except OperationFailed as failure:
+            if failure.cause == TOO_HIGH:
+                yield from self._withdraw()
+            raise
         self._keep()
 
     def _way(self, tip_y_um: float) -> float:
@@ -164,6 +176,29 @@ class OneSpan:
 
     def _to_travel(self, way_um: float) -> RetryingMove:
         return self._work.go({self._probe.y_axis: self._sign * way_um - self._probe.tip_um[1]})
+
+    def _advance(self, way_um: float) -> Steps:
+        """Go there; more force than any push should reach ends it, before the limit would."""
+        most = ceiling_un(self._push)
+        move = yield self._careful(way_um, -most, most)
+        if isinstance(move, CarefulMove) and move.felt_un is not None:
+            raise OperationFailed(
+                TOO_HIGH,
+                f"{move.felt_un:.0f} uN on the way of the probe, {self._plan.span_um:.0f} um from "
+                f"the jaws; more than {most:.0f} uN ends a push",
+            )
+
+    def _careful(self, way_um: float, low_un: float, high_un: float) -> RetryingMove | CarefulMove:
+        """Return a movement there that a force ends; nothing ends one that leads back."""
+        _, y = self._work.tip_now(self._probe)
+        move = self._to_travel(way_um)
+        if way_um <= self._way(y):
+            return move
+        return CarefulMove(move, self._work.forces, low_un, high_un)
+
+    def _withdraw(self) -> Steps:
+        _, y = self._work.tip_now(self._probe)
+        yield self._to_travel(self._way(y) - self._push.stand_off_um - self._push.search_um)
 
     def _surface_um(self) -> tuple[float, float]:
         """Return the way at which the probe should meet the fibre, and how sure that is."""
@@ -199,12 +234,23 @@ class OneSpan:
         yield from self._come_to(surface - push.near_um - SURE_TIMES * std if known else aside)
 
     def _come_to(self, way_um: float) -> Steps:
-        """Go there, and back again as long as something is felt that should not be there."""
-        push, back = self._push, 0.0
+        """Go there, and back again as long as something is felt that should not be there.
+
+        The probe goes slowly, and no further where it feels something: nothing is known to be
+        there, and a short span is stiff.
+        """
+        work, push, back = self._work, self._push, 0.0
+        zero = self._fibre.zero_un or 0.0
+        axis = work.mico[self._probe.y_axis]
         while True:
-            yield self._to_travel(way_um - back)
+            axis.set_closed_loop_frequency(min(push.slow_hz, work.settings.frequency_hz))
+            try:
+                low, high = zero - push.surprise_un, zero + push.surprise_un
+                yield self._careful(way_um - back, low, high)
+            finally:
+                axis.set_closed_loop_frequency(work.settings.frequency_hz)
             force = yield from self._mean_un(push.search_average_s)
-            if abs(force - (self._fibre.zero_un or 0.0)) <= 2.0 * push.contact_un:
+            if abs(force - zero) <= 2.0 * push.contact_un:
                 return
             back += push.stand_off_um
             if back > push.search_um + push.stand_off_um:
@@ -230,7 +276,7 @@ class OneSpan:
         return mean.mean_un
 
     def _to(self, way_um: float, seconds: float, *, loading: bool) -> Reading:
-        yield self._to_travel(way_um)
+        yield from self._advance(way_um)
         return (yield from self._measure(seconds, loading=loading))
 
     def _step_um(self) -> float:
@@ -328,6 +374,15 @@ class OneSpan:
             )
         )
 
+
+def ceiling_un(push: PushSettings) -> float:
+    """Return the force that ends a push: between what it may reach and what stops everything."""
+    if push.stop_un > push.limit_un:
+        return 0.5 * (push.limit_un + push.stop_un)
+    return CEILING_TIMES * push.limit_un
+
+
+CEILING_TIMES: Final = 1.15
 
 LEAST_BACK: Final = 5
 """Readings of the way back until where the fibre was met."""

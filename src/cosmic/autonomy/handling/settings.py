@@ -156,6 +156,9 @@ class PushSettings(StrictModel):
         far the fibre is foreseen to bow on top.
     near_um : float
         The same where it was met at another span, beyond what is unsure of the place.
+    slow_hz, surprise_un : float
+        Closed-loop frequency of the probe as it comes near a fibre, which limits its speed, and the
+        force above the baseline that ends that.
     search_um : float
         How far beyond where the fibre should be it looks.
     search_step_um : float
@@ -198,6 +201,8 @@ class PushSettings(StrictModel):
     stand_off_um: float = Field(40.0, gt=0.0)
     bow_part: float = Field(0.3, ge=0.0)
     near_um: float = Field(5.0, gt=0.0)
+    slow_hz: float = Field(500.0, ge=1.0, le=18500.0)
+    surprise_un: float = Field(6.0, gt=0.0)
     search_um: float = Field(120.0, gt=0.0)
     search_step_um: float = Field(8.0, gt=0.0)
     stiffest_ei_n_m2: float = Field(4e-10, gt=0.0)

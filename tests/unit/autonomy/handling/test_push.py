@@ -13,11 +13,12 @@ from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Reach
-from cosmic.autonomy.handling.push import NO_CONTACT, PushSpans
+from cosmic.autonomy.handling.push import NO_CONTACT, TOO_HIGH, PushSpans
 from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps
 from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.clock import ManualClock
+from cosmic.frame.errors import MoveCancelled
 from cosmic.vico.core.tool_settings import ToolSettings
 
 GRIPPER = ToolSettings(
@@ -56,6 +57,39 @@ class Done:
         """Nothing is running."""
 
 
+class Going(Done):
+    """An axis on its way, looked at every 0.2 um as samples come; it can be cancelled."""
+
+    done = False
+
+    def __init__(self, bench: "Bench", targets: dict[str, float]) -> None:
+        super().__init__()
+        self.bench, self.targets, self.cancelled = bench, targets, False
+
+    @override
+    def wait(self, timeout_s: float | None = None) -> object:
+        here = {axis: self.bench.at_um[axis] for axis in self.targets}
+        ahead = here.get("probe.y", 0.0) - self.targets.get("probe.y", 0.0)
+        for part in np.linspace(0.0, 1.0, max(2, math.ceil(min(5.0 * abs(ahead), 2000.0)))):
+            for axis, began in here.items():
+                self.bench.at_um[axis] = began + float(part) * (self.targets[axis] - began)
+            force = self.bench.force_un()
+            self.bench.felt_un = ZERO_UN + force
+            if ahead > 10.0:  # no step of a search is so long
+                self.bench.at_once_un = max(self.bench.at_once_un, force)
+            for each in tuple(self.bench.listeners):
+                each()
+            if self.cancelled:
+                self.done = True
+                raise MoveCancelled("cancelled")
+        self.done = True
+        return None
+
+    @override
+    def cancel(self) -> None:
+        self.cancelled = True
+
+
 class Axis:
     """One of the bench's axes: it is where it was sent."""
 
@@ -65,6 +99,9 @@ class Axis:
     @property
     def position_um(self) -> float:
         return round(self.bench.at_um[self.name], 1)
+
+    def set_closed_loop_frequency(self, frequency_hz: float) -> None:
+        self.bench.frequency_hz = frequency_hz
 
 
 class Daqco:
@@ -100,7 +137,8 @@ class Bench(HandlingContext):
             "probe.y": 1000.0,
         }
         self.ei, self.off_um, self.there = ei_n_m2 * 1e18, off_um, there
-        self.tilt, self.at_once_un = tilt, 0.0
+        self.tilt, self.at_once_un, self.stiffer = tilt, 0.0, 1.0
+        self.listeners, self.felt_un, self.frequency_hz = list[Any](), ZERO_UN, 0.0
         self.peak_un, self.random = 0.0, np.random.default_rng(3)
         line = np.column_stack([np.linspace(0.0, 1200.0, 61), np.zeros(61)])
         reach = Reach(Candidate(line, 1200.0, WIDTH_UM, 0.0, 60.0), 0.0, line, (250.0, 0.0))
@@ -115,12 +153,14 @@ class Bench(HandlingContext):
 
     @override
     def go(self, targets: Any) -> Any:
-        before = self.at_um["probe.y"]
-        self.at_um |= targets
-        force = self.force_un()
-        if before - self.at_um["probe.y"] > 10.0:  # no step of a search is so long
-            self.at_once_un = max(self.at_once_un, force)
-        return Done()
+        return Going(self, targets)
+
+    def subscribe(self, listener: Any) -> Any:
+        self.listeners.append(listener)
+        return lambda: self.listeners.remove(listener)
+
+    def farthest_un(self, low_un: float, high_un: float) -> float | None:
+        return None if low_un <= self.felt_un <= high_un else self.felt_un
 
     def wanted(self, seconds: float, *, settle_s: float = 0.0) -> Done:
         self.clock.sleep(seconds + settle_s)
@@ -139,6 +179,7 @@ class Bench(HandlingContext):
         if not (self.there and way > 0.0 and 0.0 < ahead < 950.0):
             return 0.0
         fibre = 3.0 * self.ei / (ahead + CLAMP_UM) ** 3
+        fibre *= self.stiffer if ahead < 400.0 else 1.0
         force = way / (1.0 / fibre + 1.0 / SENSOR_UN_UM)
         self.peak_un = max(self.peak_un, force)
         return force
@@ -186,6 +227,33 @@ def test_a_fibre_that_was_met_is_never_run_into_at_the_next_span(ei_n_m2: float,
         # Nor is it looked for from far away: that takes long in the small steps of a short span.
         for span in bench.held_fibre().spans[1:]:
             assert np.sum(span.loading) < 45
+
+
+def test_a_fibre_that_is_suddenly_much_stiffer_ends_its_push_and_not_the_campaign():
+    bench = Bench(5e-11)
+    bench.stiffer = 30.0
+    with pytest.raises(OperationFailed, match="more than 125 uN ends a push") as failed:
+        carried_out(PushSpans().run(bench))
+    assert failed.value.cause == TOO_HIGH
+    assert bench.peak_un < bench.settings.push.stop_un - ZERO_UN
+    assert bench.force_un() == 0.0, "the probe has gone back"
+    assert not bench.listeners
+
+
+def test_a_fibre_that_has_moved_towards_the_probe_is_hardly_touched_by_its_approach():
+    bench = Bench(1.5e-10)
+    steps = PushSpans().run(bench)
+    result: object = None
+    while True:
+        try:
+            wish = steps.send(result)
+        except StopIteration:
+            break
+        bench.off_um = 30.0 if bench.held_fibre().spans else 0.0
+        result = wish.wait(0.0) if hasattr(wish, "wait") else None
+    assert 0.0 < bench.at_once_un < 12.0
+    assert len(bench.held_fibre().spans) == 5
+    assert bench.frequency_hz == bench.settings.frequency_hz
 
 
 def test_a_fibre_that_is_not_there_is_reported_with_the_position():
