@@ -1,7 +1,9 @@
 """Plans of bluesky run on the simulated platform, with bluesky's own RunEngine."""
 
 import threading
+import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +11,10 @@ import numpy as np
 import pytest
 from bluesky import RunEngine, protocols
 from bluesky import plan_stubs as bps
-from bluesky.plans import count, fly, grid_scan, list_scan, rel_scan, scan
-from bluesky.preprocessors import fly_during_wrapper
+from bluesky.plans import count, fly, grid_scan, list_scan, rel_list_scan, rel_scan, scan
+from bluesky.preprocessors import fly_during_wrapper, monitor_during_wrapper
 from bluesky.simulators import check_limits
+from bluesky.suspenders import SuspendCeil, SuspendFloor
 from bluesky.utils import FailedStatus, RunEngineInterrupted
 from event_model import DocumentNames, schema_validators
 
@@ -113,8 +116,6 @@ def test_devices_have_the_shapes_of_bluesky(rig: cosmic.Rig, kind: str) -> None:
 
 
 def test_readings_are_stamped_with_the_time_of_the_day(rig: cosmic.Rig, x: Axis) -> None:
-    import time
-
     for device in (x.movable, rig.daqco["force"]):
         for reading in device.read().values():
             assert time.time() - 60.0 < reading["timestamp"] <= time.time()
@@ -281,6 +282,126 @@ def test_an_aborted_plan_leaves_nothing_moving(
     assert standing_um(x) < 1900.0
 
 
+# Watching while a plan runs
+
+
+def test_what_moves_and_what_is_felt_is_monitored_during_a_plan(
+    rig: cosmic.Rig, engine: RunEngine, x: Axis, documents: Documents
+) -> None:
+    x.set_closed_loop_frequency(SLOW_HZ * 20)
+    watched = [x.movable, rig.daqco["force"].live, rig.mico.live_clearance]
+    for device in watched:
+        assert isinstance(device, protocols.Subscribable | protocols.Readable)
+    y = rig.mico["left.y"].movable
+    engine(monitor_during_wrapper(scan([y], x.movable, 0.0, 300.0, 2), watched))
+    streams = {
+        document["uid"]: document["name"] for name, document in documents if name == "descriptor"
+    }
+    seen: dict[str, list[float]] = {}
+    for name, document in documents:
+        if name == "event" and streams[document["descriptor"]] != "primary":
+            for key, value in document["data"].items():
+                seen.setdefault(key, []).append(value)
+    assert seen.keys() == {"left_x", "force_live", "clearance_um"}
+    assert max(seen["left_x"]) == pytest.approx(300, abs=2)
+    assert len(seen["left_x"]) > 3
+    assert len(seen["force_live"]) > 3
+    assert min(seen["clearance_um"]) > 0.0
+    count = len(documents)
+    x.move_to(0.0)
+    assert len(documents) == count, "nothing is monitored once the plan is over"
+
+
+def test_a_plan_is_suspended_while_the_force_is_too_high_and_then_goes_on(
+    rig: cosmic.Rig, engine: RunEngine, x: Axis, documents: Documents
+) -> None:
+    force = rig.daqco["force"]
+    scale = rig.daqco.scales["force"]
+    high = replace(scale, coefficients=(scale.coefficients[0] + 500.0, *scale.coefficients[1:]))
+    suspender = SuspendCeil(force.live, 300.0, resume_thresh=200.0)
+    engine.install_suspender(suspender)
+    rig.daqco.disarm_limit("force")
+    rig.daqco.set_scale("force", high)  # it is felt from now on
+    threading.Timer(1.0, lambda: rig.daqco.set_scale("force", scale)).start()
+    try:
+        wait_until(lambda: force.live.get() > 300.0)
+        begun_s = time.monotonic()
+        engine(scan([], x.movable, 0.0, 20.0, 2))
+    finally:
+        engine.remove_suspender(suspender)
+        rig.daqco.set_scale("force", scale)
+    assert time.monotonic() - begun_s > 0.5
+    assert ending(documents) == "success"
+    assert [each["left_x"] for each in events(documents)] == pytest.approx([0, 20], abs=1.0)
+
+
+def test_a_plan_stops_moving_while_bodies_are_too_near(
+    rig: cosmic.Rig, engine: RunEngine, x: Axis, documents: Documents
+) -> None:
+    distance_um = rig.mico.clearance().distance_um
+    wait_until(lambda: rig.mico.live_clearance.get() == pytest.approx(distance_um, abs=1.0))
+    suspender = SuspendFloor(rig.mico.live_clearance, distance_um + 10.0)
+    engine.install_suspender(suspender)
+    threading.Timer(0.7, engine.request_pause).start()
+    try:
+        with pytest.raises(RunEngineInterrupted):
+            engine(scan([], x.movable, 100.0, 200.0, 2))
+    finally:
+        engine.remove_suspender(suspender)
+    assert standing_um(x) == pytest.approx(0.0, abs=1.0)
+    engine.abort("seen")
+
+
+# Settings and groups
+
+
+def test_settings_are_changed_by_a_plan_and_told_in_its_documents(
+    rig: cosmic.Rig, engine: RunEngine, x: Axis, documents: Documents
+) -> None:
+    force, group = rig.daqco["force"], rig.mico.group("left.x", "left.y")
+
+    def plan() -> Any:
+        old, new = yield from bps.configure(x.movable, {"frequency_hz": 1000})
+        assert new["left_x_frequency_hz"]["value"] == 1000 != old["left_x_frequency_hz"]["value"]
+        yield from bps.configure(force, {"force_average_s": 0.05})
+        yield from bps.configure(group, {"left_y_frequency_hz": 2000})
+        yield from count([force, group])
+
+    engine(plan())
+    (descriptor,) = [document for name, document in documents if name == "descriptor"]
+    told = descriptor["configuration"]
+    assert told["force"]["data"]["force_average_s"] == 0.05
+    assert told["left_x_and_left_y"]["data"]["left_x_frequency_hz"] == 1000
+    assert told["left_x_and_left_y"]["data"]["left_y_frequency_hz"] == 2000
+    force.average_s = 0.1
+    rig.mico["left.y"].set_closed_loop_frequency(FAST_HZ)
+    for device, wrong in ((x.movable, "zero"), (force, "rate_hz"), (group, "right_x_frequency_hz")):
+        with pytest.raises(cosmic.ConfigError, match="cannot be set"):
+            device.configure({wrong: 1})
+    with pytest.raises(cosmic.MoveRefused):
+        x.movable.configure({"frequency_hz": 10**6})
+
+
+def test_a_group_goes_to_distances_and_comes_back(
+    rig: cosmic.Rig, engine: RunEngine, x: Axis, documents: Documents
+) -> None:
+    rig.mico.move({"left.x": 30.0, "left.y": -10.0})
+    engine(rel_list_scan([], rig.mico.group("left.x", "left.y"), [(5.0, 0.0), (10.0, -20.0)]))
+    there = [(each["left_x"], each["left_y"]) for each in events(documents)]
+    assert np.array(there) == pytest.approx(np.array([(35, -10), (40, -30)]), abs=1.0)
+    assert standing_um(x) == pytest.approx(30.0, abs=1.0)
+
+
+def test_a_group_with_a_name_is_read_beside_its_own_axes(
+    rig: cosmic.Rig, engine: RunEngine, x: Axis, documents: Documents
+) -> None:
+    arm = rig.mico.group("left.x", "left.y", name="arm")
+    assert arm.read().keys() == arm.describe().keys() == {"arm_left_x", "arm_left_y"}
+    engine(list_scan([x.movable], arm, [(5.0, 0.0), (10.0, 5.0)]))
+    for each in events(documents):
+        assert each["left_x"] == pytest.approx(each["arm_left_x"], abs=1.0)
+
+
 # Detectors
 
 
@@ -395,12 +516,19 @@ def test_a_camera_in_a_scan_keeps_a_fresh_image_of_every_place(
         (tmp_path / f"{camera.name}_00007.png").touch()
         camera.plan_images(tmp_path, suffix=".png", fibres=True)
         engine(scan([camera], rig.mico["right.x"].movable, 0.0, 100.0, 2))
-        assert camera.read().keys() == camera.describe().keys()
+        external = {f"{camera.name}_image"}
+        assert camera.read().keys() | external == camera.describe().keys()
         assert set(camera.hints["fields"]) <= camera.read().keys()
         kept = [Path(each[f"{camera.name}_file"]) for each in events(documents)]
         assert [each.name[-9:] for each in kept] == ["00008.png", "00009.png"]
         assert all(each.stat().st_size > 10_000 for each in kept)
         first, second = events(documents)
+        told = [document for name, document in documents if name.startswith("stream_")]
+        (folder, *images) = told
+        assert folder["uri"] == f"file://localhost{tmp_path.as_posix()}/"
+        names = [folder["parameters"]["template"].format(n["indices"]["start"]) for n in images]
+        assert names == [each.name for each in kept], "tiled finds the same files"
+        assert [each["seq_nums"]["start"] for each in images] == [1, 2]
         assert first[f"{camera.name}_frame"] < second[f"{camera.name}_frame"]
         assert first[f"{camera.name}_fibres"] > 0
         assert first[f"{camera.name}_fibre_length_um"] > 500.0

@@ -5,12 +5,15 @@ CoSMic are bluesky's.
 """
 
 import logging
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
-from typing import Any, NotRequired, TypedDict
+from typing import Any, NotRequired, Protocol, TypedDict
 
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.errors import ConfigError
 from cosmic.frame.operation import Operation
 
 logger = logging.getLogger(__name__)
@@ -31,6 +34,7 @@ class DataKey(TypedDict):
     shape: list[int]
     dtype_numpy: NotRequired[str]
     units: NotRequired[str]
+    external: NotRequired[str]
 
 
 class EventPage(TypedDict):
@@ -79,6 +83,41 @@ def unix_of_wall_s(wall_s: float) -> float:
 def unix_of_platform_s(clock: Clock, platform_s: float) -> float:
     """Return the UNIX time of a moment of the platform's clock."""
     return unix_now_s() - (clock.now_s() - platform_s) / (clock.rate or 1.0)
+
+
+class Configured(Protocol):
+    """What has a name and settings that are read back."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What the names of its settings begin with."""
+
+    @abstractmethod
+    def read_configuration(self) -> Readings:
+        """Return its settings."""
+
+
+def configure(
+    device: Configured, wanted: Mapping[str, Any], setters: Mapping[str, Callable[[Any], object]]
+) -> tuple[Readings, Readings]:
+    """Change settings of a device, by their names with or without its own; return old and new.
+
+    Raises
+    ------
+    ConfigError
+        It has no such setting; nothing was changed.
+    """
+    prefix = f"{device.name}_"
+    chosen = {key.removeprefix(prefix): value for key, value in wanted.items()}
+    unknown = sorted(set(chosen) - set(setters))
+    if unknown:
+        there = ", ".join(setters) or "nothing"
+        raise ConfigError(f"{device.name}: {', '.join(unknown)} cannot be set; there is {there}")
+    before = device.read_configuration()
+    for key, value in chosen.items():
+        setters[key](value)
+    return before, device.read_configuration()
 
 
 class PlanStatus(Operation[None]):

@@ -1,8 +1,8 @@
 """One channel of ``rig.daqco``, in the shape that plans of bluesky expect of a detector."""
 
 import math
-from collections.abc import Callable, Iterator
-from typing import Final, Protocol
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Final, Protocol
 
 import numpy as np
 from typing_extensions import override
@@ -14,17 +14,20 @@ from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
+from cosmic.frame.events import Unsubscribe
 from cosmic.frame.plan_shape import (
     DataKeys,
     EventPage,
     PlanStatus,
     Readings,
+    configure,
     number_key,
     plain_name,
     text_key,
     unix_now_s,
     unix_of_platform_s,
 )
+from cosmic.frame.plan_signal import PlanSignal
 
 AVERAGE_S: Final = 0.1
 LONGEST_AVERAGE_S: Final = 600.0
@@ -81,6 +84,7 @@ class ChannelHandle:
         self._average_s = AVERAGE_S
         self._read: tuple[float, float, float] | None = None
         self._flyer: ChannelFlyer | None = None
+        self._live = LiveChannel(self, acquisition)
 
     @override
     def __repr__(self) -> str:
@@ -156,7 +160,7 @@ class ChannelHandle:
         NotAvailable
             Nothing has been acquired yet.
         """
-        mean, std, when_s = self._read or self._newest()
+        mean, std, when_s = self._read or self.newest()
         return {
             self.name: {"value": mean, "timestamp": when_s},
             f"{self.name}_std": {"value": std, "timestamp": when_s},
@@ -188,10 +192,23 @@ class ChannelHandle:
             f"{self.name}_scale": text_key(self._source),
         }
 
+    def configure(self, settings: Mapping[str, Any]) -> tuple[Readings, Readings]:
+        """Change `average_s`; return the settings before and after. Raises `ConfigError`."""
+
+        def average(duration_s: float) -> None:
+            self.average_s = duration_s
+
+        return configure(self, settings, {"average_s": average})
+
     @property
     def hints(self) -> dict[str, list[str]]:
         """Which of its readings a plot shows: the mean."""
         return {"fields": [self.name]}
+
+    @property
+    def live(self) -> "LiveChannel":
+        """Its newest value, for monitors and suspenders."""
+        return self._live
 
     # Every sample
 
@@ -263,7 +280,8 @@ class ChannelHandle:
         status.add_callback(forget)
         look()
 
-    def _newest(self) -> tuple[float, float, float]:
+    def newest(self) -> tuple[float, float, float]:
+        """Return mean, standard deviation and time of the newest chunk; raises `NotAvailable`."""
         chunk = self._acquisition.latest_chunk
         if chunk is None:
             raise NotAvailable(self._acquisition.problem or "nothing has been acquired yet")
@@ -277,3 +295,39 @@ class ChannelHandle:
             if each.name == self._channel:
                 return f"{each.board}/{each.input}"
         return self._channel
+
+
+class LiveChannel(PlanSignal):
+    """``rig.daqco["force"].live``: the mean of the newest samples, as they come; any thread.
+
+    Bluesky's monitors and suspenders take it.
+    """
+
+    parent: None = None
+
+    def __init__(self, channel: ChannelHandle, acquisition: Acquisition) -> None:
+        self._of = channel
+        self._acquisition = acquisition
+
+    @property
+    def name(self) -> str:
+        """Name of its reading, such as "force_live"."""
+        return f"{self._of.name}_live"
+
+    @override
+    def get(self) -> float:
+        """Return the mean of the newest samples; raises `NotAvailable` before the first."""
+        return self._of.newest()[0]
+
+    def read(self) -> Readings:
+        """Return the same as a bluesky reading."""
+        mean, _, when_s = self._of.newest()
+        return {self.name: {"value": mean, "timestamp": when_s}}
+
+    def describe(self) -> DataKeys:
+        """Return what `read` returns, in bluesky's terms."""
+        return {self.name: self._of.describe()[self._of.name]}
+
+    @override
+    def _on_news(self, listener: Callable[[], object]) -> Unsubscribe:
+        return self._acquisition.subscribe(lambda _chunk: listener())

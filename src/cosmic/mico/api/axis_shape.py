@@ -2,27 +2,33 @@
 
 import math
 from abc import abstractmethod
-from typing import Final, Literal, Protocol
+from collections.abc import Callable, Mapping
+from typing import Any, Final, Literal, Protocol
 
 from typing_extensions import override
 
 from cosmic.frame.arguments import checked_class
-from cosmic.frame.errors import CosmicError, refusal
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import CosmicError, DeviceTimeout, refusal
+from cosmic.frame.events import Unsubscribe
 from cosmic.frame.plan_shape import (
     DataKeys,
     Readings,
+    configure,
     number_key,
     plain_name,
     text_key,
     unix_now_s,
     unix_of_wall_s,
 )
+from cosmic.frame.plan_signal import PlanSignal
 from cosmic.frame.verdict import MoveVerdict
-from cosmic.mico.api.entry import Number, as_number
+from cosmic.mico.api.entry import Number, as_number, as_whole
 from cosmic.mico.api.move_status import MoveStatus, refused
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.positioner import PositionerState
 
+IN_FORCE_S: Final = 1.0
 # How far from a target an axis still counts as standing at it: more than the noise of any sensor.
 STANDS_AT: Final = {"um": 1.0, "deg": 0.1}
 
@@ -51,6 +57,19 @@ class PlanAxis(Protocol):
     @abstractmethod
     def halt(self) -> None:
         """Stop it."""
+
+    @property
+    @abstractmethod
+    def closed_loop_frequency_hz(self) -> int | None:
+        """What limits the speed of movements to a position."""
+
+    @abstractmethod
+    def set_closed_loop_frequency(self, frequency_hz: Number) -> None:
+        """Limit the speed of movements to a position."""
+
+    @abstractmethod
+    def subscribe(self, callback: Callable[[PositionerState], object]) -> Callable[[], None]:
+        """Call `callback(state)` after each change."""
 
 
 @checked_class
@@ -132,14 +151,16 @@ class AxisShape:
         return {self.name: number_key(self._source, self._now.unit)}
 
     def read_configuration(self) -> Readings:
-        """Return the user's zero, the soft limits and how well the position is known."""
+        """Return zero, soft limits, how well the position is known, and what limits the speed."""
         state, now_s = self._now, unix_now_s()
         low, high = state.shown_limits or (math.nan, math.nan)
+        frequency_hz = self._axis.closed_loop_frequency_hz
         values = {
             "zero": state.zero,
             "low_limit": low,
             "high_limit": high,
             "confidence": str(state.confidence),
+            "frequency_hz": math.nan if frequency_hz is None else frequency_hz,
         }
         return {
             f"{self.name}_{key}": {"value": value, "timestamp": now_s}
@@ -153,7 +174,33 @@ class AxisShape:
             f"{self.name}_{key}": number_key(source, unit)
             for key in ("zero", "low_limit", "high_limit")
         }
-        return {**keys, f"{self.name}_confidence": text_key(source)}
+        return {
+            **keys,
+            f"{self.name}_confidence": text_key(source),
+            f"{self.name}_frequency_hz": number_key(source, "Hz"),
+        }
+
+    def configure(self, settings: Mapping[str, Any]) -> tuple[Readings, Readings]:
+        """Change `frequency_hz`, which limits the speed; return the settings before and after.
+
+        Raises
+        ------
+        ConfigError
+            Something else is to be changed.
+        MoveRefused
+            The frequency is not one that the axis takes.
+        DeviceTimeout
+            It is not in force within a second.
+        """
+        return configure(self, settings, {"frequency_hz": self._set_frequency})
+
+    def _set_frequency(self, frequency_hz: Number) -> None:
+        self._axis.set_closed_loop_frequency(frequency_hz)
+        wanted, until_s = as_whole(frequency_hz, "Hz", self._now.name), WALL.now_s() + IN_FORCE_S
+        while self._axis.closed_loop_frequency_hz != wanted:
+            if WALL.now_s() > until_s:
+                raise DeviceTimeout(f"{self._now.name}: {wanted} Hz is not in force yet")
+            WALL.sleep(0.005)
 
     @property
     def hints(self) -> dict[str, list[str]]:
@@ -166,8 +213,11 @@ class AxisShape:
 
 
 @checked_class
-class AxisMovable(AxisShape):
-    """An axis for bluesky's RunEngine, whose documents forbid the dot in a name: "left_x"."""
+class AxisMovable(AxisShape, PlanSignal):
+    """An axis for bluesky's RunEngine, whose documents forbid the dot in a name: "left_x".
+
+    Plans can monitor it, and suspenders watch its position.
+    """
 
     def __init__(self, axis: PlanAxis) -> None:
         self._moved = axis
@@ -186,6 +236,16 @@ class AxisMovable(AxisShape):
     @override
     def _axis(self) -> PlanAxis:
         return self._moved
+
+    @override
+    def get(self) -> float:
+        """Return the position; NaN before the first."""
+        here = self._now.shown_position
+        return math.nan if here is None else here
+
+    @override
+    def _on_news(self, listener: Callable[[], object]) -> Unsubscribe:
+        return self._moved.subscribe(lambda _state: listener())
 
     def check(self, position: Number, *, consent: bool = False) -> MoveVerdict:
         """Return the gate's answer to a move to `position`, without moving."""

@@ -38,6 +38,7 @@ from cosmic.mico.api.entry import Number, as_number, finite, one_line, source_of
 from cosmic.mico.api.foresight import foreseen
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.initialisation import Confirm
+from cosmic.mico.api.live_clearance import LiveClearance
 from cosmic.mico.api.news import (
     AxisBegun,
     AxisEnded,
@@ -91,6 +92,8 @@ class Mico(Declared):
     source : str
         Who commands through this object, for the log: "script", "window", "key".
     """
+
+    _live_clearance: LiveClearance | None = None
 
     def __init__(self, application: MicoApplication, source: str = "script") -> None:
         self._application: MicoApplicationBase = application
@@ -969,6 +972,16 @@ class Mico(Declared):
             There is no collision model, or the position of some axis is not known.
         """
         return self.collision.clearance()
+
+    @property
+    def live_clearance(self) -> LiveClearance:
+        """The distance of the nearest bodies for plans; raises `NotAvailable` without a model."""
+        watch = self._application.clearance_watch
+        if watch is None:
+            raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the platform file")
+        if self._live_clearance is None:
+            self._live_clearance = LiveClearance(watch)
+        return self._live_clearance
 
     @command(reads=True)
     def nearest(self, positions: dict[str, float]) -> Approach | None:

@@ -3,9 +3,10 @@
 import math
 import re
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
+from uuid import uuid4
 
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.clock import Clock
@@ -13,6 +14,7 @@ from cosmic.frame.errors import ConfigError, NotAvailable, RecordingExistsError
 from cosmic.frame.file_names import check_directory
 from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.plan_shape import (
+    DataKey,
     DataKeys,
     PlanStatus,
     Readings,
@@ -32,13 +34,19 @@ if TYPE_CHECKING:
 
 SUFFIXES: Final = (".tif", ".tiff", ".png")
 WAIT_S: Final = 5.0
+StreamAsset = tuple[str, dict[str, Any]]
+"""Name and content of a document of bluesky."""
 # Of the longest fibre, as `PlacedFibre` names them, with their units.
 MEASURES: Final[Mapping[str, str]] = {"length_um": "um", "width_um": "um", "curl": ""}
 
 
 @checked_class
 class CameraShape:
-    """Readable, Configurable and Triggerable, without bluesky; any thread."""
+    """Readable, Configurable, Triggerable, Stageable and WritesExternalAssets, without bluesky.
+
+    Images that are kept reach what reads documents, such as tiled, as a stream resource of files.
+    Any thread.
+    """
 
     parent: None = None
     name: str
@@ -47,6 +55,8 @@ class CameraShape:
     _fibres = False
     _number = 0
     _last: tuple[Readings, float] | None = None
+    _assets: tuple[StreamAsset, ...] = ()
+    _resource = ""
 
     # What it is the shape of
 
@@ -71,6 +81,11 @@ class CameraShape:
     @abstractmethod
     def now_s(self) -> float:
         """Return the time by which images are dated."""
+
+    @property
+    @abstractmethod
+    def _newest(self) -> CameraImage | None:
+        """The newest image; None before the first."""
 
     @property
     @abstractmethod
@@ -118,8 +133,31 @@ class CameraShape:
         if suffix not in SUFFIXES:
             raise ConfigError(f"{suffix!r}: an image is one of {', '.join(SUFFIXES)}")
         chosen = None if folder is None else check_directory(Path(folder).absolute())
+        self._assets, self._resource = (), ""
         self._folder, self._suffix, self._fibres, self._last = chosen, suffix, fibres, None
         self._number = 0 if chosen is None else _last_number(chosen, self.name)
+
+    def stage(self) -> "list[CameraShape]":
+        """Begin a run of plans: its images are a resource of their own."""
+        self._assets, self._resource = (), ""
+        return [self]
+
+    def unstage(self) -> "list[CameraShape]":
+        """End it; the camera stays as it is."""
+        self._assets, self._resource = (), ""
+        return [self]
+
+    def collect_asset_docs(self, index: int | None = None) -> Iterator[StreamAsset]:
+        """Yield the documents of images that were kept since the last call, in bluesky's terms.
+
+        Parameters
+        ----------
+        index : int or None
+            Bluesky's; each image is told of with the event it belongs to.
+        """
+        del index
+        found, self._assets = self._assets, ()
+        yield from found
 
     def trigger(self) -> PlanStatus:
         """Begin to take an image exposed after this call; the status ends when all is done.
@@ -149,7 +187,9 @@ class CameraShape:
             "scale_um_px": math.nan if scale is None else scale,
         }
         if self._folder is not None:
-            values["file"] = str(self._save(image, self._folder))
+            path = self._save(image, self._folder)
+            values["file"] = str(path)
+            self._assets = (*self._assets, *self._documents(path))
         if self._fibres:
             values |= self._measured(image)
         return {
@@ -166,6 +206,37 @@ class CameraShape:
                 return save_image(image, path, axes=axes)
             except RecordingExistsError:
                 continue  # somebody else put it there meanwhile: never replaced
+
+    def _documents(self, path: Path) -> Iterator[StreamAsset]:
+        """Yield what tells of one more file; the first of a run tells of the folder before it."""
+        if not self._resource:
+            self._resource = str(uuid4())
+            kind = "image/png" if self._suffix == ".png" else "image/tiff"
+            yield (
+                "stream_resource",
+                {
+                    "uid": self._resource,
+                    "data_key": f"{self.name}_image",
+                    "mimetype": f"multipart/related;type={kind}",
+                    "uri": f"{path.parent.as_uri().replace('file:///', 'file://localhost/')}/",
+                    "parameters": {
+                        "chunk_shape": [1],
+                        "template": f"{self.name}_{{:05d}}{self._suffix}",
+                        "join_method": "stack",
+                    },
+                },
+            )
+        numbers = {"start": self._number, "stop": self._number + 1}
+        yield (
+            "stream_datum",
+            {
+                "uid": f"{self._resource}/{self._number}",
+                "stream_resource": self._resource,
+                "descriptor": "",  # these two are for whoever bundles the event to say
+                "seq_nums": {"start": 0, "stop": 0},
+                "indices": numbers,
+            },
+        )
 
     def _measured(self, image: CameraImage) -> dict[str, object]:
         # Imported here: it loads OpenCV and scipy.
@@ -192,7 +263,10 @@ class CameraShape:
         return dict(self._last[0])
 
     def describe(self) -> DataKeys:
-        """Return what `read` returns, in bluesky's terms; it follows `plan_images`."""
+        """Return what `read` returns, in bluesky's terms; it follows `plan_images`.
+
+        Images that are kept are described as well; `collect_asset_docs` tells where they are.
+        """
         source = self._source
         keys = {
             "frame": whole_key(source),
@@ -201,12 +275,25 @@ class CameraShape:
         }
         if self._folder is not None:
             keys["file"] = text_key(source)
+            keys["image"] = self._image_key()
         if self._fibres:
             keys["fibres"] = whole_key(source)
             for key, unit in MEASURES.items():
                 keys[f"fibre_{key}"] = number_key(source, unit)
             keys["fibre_certain"] = whole_key(source)
         return {f"{self.name}_{key}": value for key, value in keys.items()}
+
+    def _image_key(self) -> DataKey:
+        shown = self._newest
+        height, width = (0, 0) if shown is None else shown.data.shape[:2]
+        kind = "|u1" if shown is None else shown.data.dtype.str
+        return {
+            "source": self._source,
+            "dtype": "array",
+            "shape": [int(height), int(width)],
+            "dtype_numpy": kind,
+            "external": "STREAM:",
+        }
 
     def read_configuration(self) -> Readings:
         """Return exposure, gain, binning and trigger; NaN, 0 and empty without a camera."""
