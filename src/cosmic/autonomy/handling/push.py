@@ -107,6 +107,8 @@ GUESS_TIMES: Final = 1.6
 """So much stiffer than guessed a fibre may be at a span."""
 SURE_TIMES: Final = 3.0
 """The probe comes near a fibre at once but for so many standard deviations of where that is."""
+SLOW_UM: Final = 100.0
+"""How far before where it goes to the probe becomes slow: it may come from far away."""
 MET_STD_UM: Final = 0.7
 """Of the contact that the rise of a push leads back to."""
 GROWTH: Final = 1.5
@@ -242,6 +244,9 @@ class OneSpan:
         work, push, back = self._work, self._push, 0.0
         zero = self._fibre.zero_un or 0.0
         axis = work.mico[self._probe.y_axis]
+        _, y = work.tip_now(self._probe)
+        if self._way(y) < way_um - SLOW_UM:
+            yield self._to_travel(way_um - SLOW_UM)
         while True:
             axis.set_closed_loop_frequency(min(push.slow_hz, work.settings.frequency_hz))
             try:
