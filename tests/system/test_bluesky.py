@@ -355,7 +355,7 @@ def test_a_plan_stops_moving_while_bodies_are_too_near(
 # Settings and groups
 
 
-def test_settings_are_changed_by_a_plan_and_told_in_its_documents(
+def test_settings_that_a_plan_changes_are_in_its_documents(
     rig: cosmic.Rig, engine: RunEngine, x: Axis, documents: Documents
 ) -> None:
     force, group = rig.daqco["force"], rig.mico.group("left.x", "left.y")

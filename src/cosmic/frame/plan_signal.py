@@ -50,7 +50,7 @@ class PlanSignal:
 
         turn, over = RLock(), False
 
-        def tell() -> None:
+        def publish() -> None:
             with turn, suppress(CosmicError):
                 if not over:
                     notify(function, value=self.get(), timestamp=unix_now_s(), obj=self)
@@ -62,10 +62,10 @@ class PlanSignal:
                 over = True
 
         self.clear_sub(function)
-        forget = self._on_news(tell)
+        forget = self._on_news(publish)
         self._subscribed = (*self._subscribed, (function, end))
         if run:
-            tell()
+            publish()
 
     def clear_sub(self, function: Callable[..., object]) -> None:
         """End a subscription, and wait for a call under way; harmless where there is none."""
