@@ -53,6 +53,31 @@ def test_the_gates_own_reservation_moves_the_axis_once():
         assert [call[2] for call in controller.of("move_to")] == [5.0, 0.0]
 
 
+def test_an_order_is_carried_out_once_and_what_it_began_goes_on():
+    with platform() as (manager, controller):
+        order = Order(0, MoveBy(5.0, "um"), manager.lease.local_token, "attack")
+        manager.devices[0].submit(order)
+        with pytest.raises(cosmic.MoveRefused, match=f"d0.c0: order {order.number} was submitted"):
+            manager.devices[0].submit(order)
+        assert order.movement.wait(2) == 5.0
+        with pytest.raises(cosmic.MoveRefused, match="give a new one"):
+            manager.devices[0].submit(order._replace(motion=MoveBy(-5.0, "um")))
+        assert [call[2] for call in controller.of("move_to")] == [5.0]
+
+
+def test_an_order_made_before_a_stop_does_not_move_after_its_reset():
+    with platform() as (manager, controller):
+        before = manager.gate.stop_state.epoch
+        order = Order(0, MoveBy(5.0, "um"), manager.lease.local_token, "attack", epoch=before)
+        manager.stop("a test")
+        manager.reset_stop()
+        manager.devices[0].submit(order)
+        verdict = refused(order.movement)
+        assert verdict.reason is Reason.STOPPED
+        assert "a stop came after the order was made" in str(verdict)
+        assert not controller.of("move_to")
+
+
 FORGED = {
     "made up": lambda reservation: Reservation(NAME, 987654, 0, 90.0),
     "made up with a number that was given": lambda reservation: Reservation(

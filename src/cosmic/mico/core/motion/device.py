@@ -25,7 +25,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.inbox import Inbox
 from cosmic.frame.operation import Task
 from cosmic.frame.threads import JOIN_TIMEOUT_S, WorkerThread
-from cosmic.frame.verdict import Reason, refuse
+from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.motion.channel import ChannelController
 from cosmic.mico.core.motion.channel_context import AxisReports, ChannelContext
 from cosmic.mico.core.motion.data_container import DeviceDataContainer
@@ -264,15 +264,27 @@ class Device(WorkerThread):
         self.start()
 
     def submit(self, order: Order) -> None:
-        """Queue `order`; how it goes is reported by its movement and by signals."""
+        """Queue `order`; how it goes is reported by its movement and by signals.
+
+        Raises
+        ------
+        MoveRefused
+            It was submitted before: an order is carried out once, and what it began goes on.
+        """
+        if not order.movement.order():
+            raise refusal(self._spent(order))
         stop = self._context.gate.stop_state
         if stop.reason is not None:
-            self._refuse_stopped(order, stop.reason)
+            why = f"motion is stopped ({stop.reason}); reset the stop first"
+            self._refuse_stopped(order, why)
+            return
+        if order.epoch not in (None, stop.epoch):
+            self._refuse_stopped(order, "a stop came after the order was made; give a new one")
             return
         # First, for the device thread cannot begin before this one lets it. Cancelled in between,
         # the order finds that out before it is sent.
         order.movement.on_cancel(partial(self._cancel, order))
-        if order.epoch != stop.epoch:
+        if order.epoch is None:
             order = order._replace(epoch=stop.epoch)
         with self._intake:
             taken = self._open
@@ -297,8 +309,7 @@ class Device(WorkerThread):
 
     def halt(self, channel: int, why: str) -> None:
         """Stop one channel past every queue; its movement fails with `MoveCancelled`."""
-        state = self.container.state(channel)
-        name = state.name if state else f"device {self.index} channel {channel}"
+        name = self._shown(channel)
         with self._intake:
             self._void[channel] = self._newest.get(channel, 0)
         # First, so that the device thread knows of the halt before it sees the axis at rest.
@@ -321,11 +332,20 @@ class Device(WorkerThread):
         except DeviceError as exc:
             logger.warning("device %d channel %d: %s", self.index, order.channel, exc)
 
-    def _refuse_stopped(self, order: Order, reason: str) -> None:
-        state = self.container.state(order.channel)
-        name = state.name if state else f"device {self.index} channel {order.channel}"
-        text = f"{name}: motion is stopped ({reason}); reset the stop first"
-        verdict = refuse(Reason.STOPPED, text, axis=name)
+    def _spent(self, order: Order) -> MoveVerdict:
+        name = self._shown(order.channel)
+        text = f"{name}: order {order.number} was submitted before; give a new one"
+        verdict = refuse(Reason.NO_LEASE, text, axis=name)
+        logger.warning("refused (%s): %s", order.source, verdict)
+        return verdict
+
+    def _shown(self, channel: int) -> str:
+        state = self.container.state(channel)
+        return state.name if state else f"device {self.index} channel {channel}"
+
+    def _refuse_stopped(self, order: Order, why: str) -> None:
+        name = self._shown(order.channel)
+        verdict = refuse(Reason.STOPPED, f"{name}: {why}", axis=name)
         self._context.gate.withdraw(order.reservation)
         logger.warning("refused (%s): %s", order.source, verdict)
         self._context.reports.refused(order, verdict)

@@ -55,7 +55,7 @@ class Order(_OrderFields):
     reservation : Reservation or None
         Set where the gate has already decided, together with others.
     epoch : int or None
-        Number of stops so far when it was submitted; a stop since then makes it void.
+        Number of stops so far when it was made, or submitted; a stop since then makes it void.
     follows : Movement or None
         The order is void unless this was the newest on its channel, and nothing was halted since.
     start : GroupStart or None

@@ -25,11 +25,18 @@ class Movement(Operation[float | None]):
         # Not by the base class: one is made between a command and the call of the library.
         self._began_s = WALL.now_s()
         self._lock = Lock()
+        self._ordered = False
 
     @classmethod
     @override
     def followed(cls, title: str) -> Self:
         return cls()
+
+    def order(self) -> bool:
+        """Note that a device takes its order now; False where one did before. Any thread."""
+        with self._lock:
+            before, self._ordered = self._ordered, True
+        return not before
 
     @property
     def cancelled(self) -> bool:
