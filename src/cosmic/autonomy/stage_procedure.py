@@ -168,9 +168,16 @@ class StageProcedure:
             raise CalibrationRefused(
                 "calibration: the zoom changed during the measurement; leave it and try again"
             )
-        return Plane(
-            zoom, float(begun[2]), fit_map(sightings), datetime.now(UTC).replace(microsecond=0)
-        )
+        fit = fit_map(sightings, axis_px=self._axis_px())
+        return Plane(zoom, float(begun[2]), fit, datetime.now(UTC).replace(microsecond=0))
+
+    def _axis_px(self) -> tuple[float, float] | None:
+        """Return the middle of the whole sensor; None where the camera does not tell its size."""
+        info = self._unit.thread.info
+        if info is None or not all(info.sensor_px):
+            return None
+        width, height = info.sensor_px
+        return 0.5 * (width - 1), 0.5 * (height - 1)
 
     # Where things are
 

@@ -155,6 +155,60 @@ def test_a_tip_that_was_seen_unsurely_hardly_moves_the_map() -> None:
     assert np.abs(fit.map.to_px(corners) - true.to_px(corners)).max() < 0.15
 
 
+SENSOR_MIDDLE = (799.5, 599.5)
+
+
+def through_a_lens(sightings: list[Sighting], part: float) -> list[Sighting]:
+    """Return them as a lens shows them that moves the corners out by a part of their distance."""
+    found = []
+    for each in sightings:
+        away = np.array(each.image_px) - SENSOR_MIDDLE
+        moved = away * (1.0 + part * (away @ away) / (SENSOR_MIDDLE @ np.array(SENSOR_MIDDLE)))
+        x, y = (np.array(SENSOR_MIDDLE) + moved).tolist()
+        found.append(replace(each, image_px=(x, y)))
+    return found
+
+
+@pytest.mark.parametrize("part", [-0.03, -0.004, 0.0, 0.004, 0.015, 0.03])
+def test_what_a_lens_bends_is_measured_with_the_map(part: float) -> None:
+    places = grid(step_um=800.0)
+    seen = through_a_lens(look(places, noise_px=0.05, seed=4), part)
+    fit = fit_map(seen, axis_px=SENSOR_MIDDLE)
+    assert not fit.outliers
+    assert fit.rms_px < 0.12
+    corners = grid(step_um=1500.0, count=2)  # beyond what was measured
+    true = np.array([e.image_px for e in through_a_lens(look(corners, noise_px=0.0), part)])
+    assert np.abs(fit.map.to_px(corners) - true).max() < 0.5
+    assert fit.map.to_um(fit.map.to_px(corners)) == pytest.approx(corners, abs=0.01)
+    binned = fit.map.for_window(x_px=30, y_px=20, binning=2)
+    assert binned.to_px(corners) == pytest.approx((true - 0.5) / 2.0 - (30, 20), abs=0.25)
+
+
+def test_a_bent_lens_that_is_taken_for_straight_is_refused() -> None:
+    seen = through_a_lens(look(grid(step_um=800.0), noise_px=0.05), 0.03)
+    with pytest.raises(CalibrationRefused):
+        fit_map(seen)
+
+
+def test_a_wrong_sighting_is_no_bend_of_the_lens() -> None:
+    seen = through_a_lens(look(grid(step_um=800.0), noise_px=0.05), 0.015)
+    x, y = seen[2].image_px
+    seen[2] = replace(seen[2], image_px=(x + 9.0, y - 6.0))
+    fit = fit_map(seen, axis_px=SENSOR_MIDDLE)
+    assert [each.split(":")[0] for each in fit.outliers] == ["point 3"]
+    assert fit.map.bend_px2 * (SENSOR_MIDDLE @ np.array(SENSOR_MIDDLE)) == pytest.approx(
+        0.015, abs=0.003
+    )
+
+
+def test_a_bent_map_is_kept_in_its_file(tmp_path: Path) -> None:
+    seen = through_a_lens(look(grid(step_um=800.0), noise_px=0.05), 0.015)
+    whole = Plane(120.0, 10.0, fit_map(seen, axis_px=SENSOR_MIDDLE), NOW)
+    path = tmp_path / "lens.toml"
+    save_calibration(path, Calibration("lens").with_plane(whole))
+    assert load_calibration(path, "lens").planes[0].fit.map == whole.fit.map
+
+
 def test_an_axis_that_did_not_travel_the_whole_distance_is_refused() -> None:
     short = [
         replace(each, platform_um=(each.platform_um[0], 1.2 * each.platform_um[1]))

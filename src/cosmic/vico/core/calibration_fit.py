@@ -10,7 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.frame.errors import CosmicError
-from cosmic.vico.core.pixel_map import Floats, Pair, PixelMap, as_matrix, as_pair
+from cosmic.vico.core.pixel_map import (
+    Floats,
+    Pair,
+    PixelMap,
+    as_matrix,
+    as_pair,
+    straightened,
+)
 
 FEWEST_POINTS: Final = 4
 LARGEST_RMS_PX: Final = 0.5
@@ -22,6 +29,12 @@ LARGEST_ANISOTROPY: Final = 0.05
 MOST_TRIPLES: Final = 400
 SURE_PX: Final = 0.1
 """Standard deviation below which all sightings count alike."""
+BENT_PART: Final = 0.03
+"""By what part of its distance a lens may move a corner of the image."""
+BENT_PARTS: Final = (0.0, -0.04, -0.02, -0.01, 0.01, 0.02, 0.04)
+FEWEST_BENT: Final = 7
+"""Points from which that can be told."""
+ROUNDS: Final = 4
 STD_TIMES: Final = 4.0
 """By so much what an edge's scatter says is too small where something lies across it."""
 
@@ -76,8 +89,19 @@ class MapFit:
     outliers: tuple[str, ...] = ()
 
 
-def fit_map(sightings: Sequence[Sighting], *, limit_px: float = LARGEST_RMS_PX) -> MapFit:
+def fit_map(
+    sightings: Sequence[Sighting],
+    *,
+    limit_px: float = LARGEST_RMS_PX,
+    axis_px: Pair | None = None,
+) -> MapFit:
     """Fit the map from stage to image.
+
+    Parameters
+    ----------
+    axis_px : (float, float) or None
+        The middle of the sensor, about which a lens bends the image; None: it is taken to be
+        straight.
 
     Raises
     ------
@@ -92,9 +116,9 @@ def fit_map(sightings: Sequence[Sighting], *, limit_px: float = LARGEST_RMS_PX) 
         raise CalibrationRefused("calibration: a point or a pixel is not a number; track again")
     _check_points(points, seen)
     weights = _weights(sightings)
-    kept = _inliers(points, seen, weights)
+    kept = _inliers(points, seen, weights, axis_px)
     left_out = np.flatnonzero(~kept).tolist()
-    fitted, residuals_px = _least_squares(points[kept], seen[kept], weights[kept])
+    fitted, residuals_px = _least_squares(points[kept], seen[kept], weights[kept], axis_px)
     off_px = np.linalg.norm(fitted.to_px(points) - seen, axis=1)
     outliers = tuple(
         f"{sightings[i].label or f'point {i + 1}'}: {off_px[i]:.1f} px off" for i in left_out
@@ -149,8 +173,23 @@ def _weights(sightings: Sequence[Sighting]) -> Floats:
     return np.asarray(SURE_PX**2 / (SURE_PX**2 + std_px**2))
 
 
-def _least_squares(points: Floats, seen: Floats, weights: Floats) -> tuple[PixelMap, Floats]:
+def _least_squares(
+    points: Floats, seen: Floats, weights: Floats, axis_px: Pair | None
+) -> tuple[PixelMap, Floats]:
     """Return the map and how far each point is from it, px."""
+    axis, bend = axis_px or (0.0, 0.0), 0.0
+    fitted = _straight_map(points, seen, weights, axis, bend)
+    for _ in range(ROUNDS if axis_px is not None and len(points) >= FEWEST_BENT else 0):
+        bend += _more_bend(fitted, points, seen, weights)
+        fitted = _straight_map(points, straightened(seen, axis, bend), weights, axis, bend)
+    error = fitted.to_px(points) - seen
+    return fitted, np.asarray(np.linalg.norm(error, axis=1))
+
+
+def _straight_map(
+    points: Floats, seen: Floats, weights: Floats, axis_px: Pair, bend_px2: float
+) -> PixelMap:
+    """Return the map of what was put straight."""
     centre_um = weights @ points / weights.sum()
     centre_px = weights @ seen / weights.sum()
     away, root = points - centre_um, np.sqrt(weights)[:, None]
@@ -158,39 +197,68 @@ def _least_squares(points: Floats, seen: Floats, weights: Floats) -> tuple[Pixel
     error = away @ solution - (seen - centre_px)
     # Two coordinates a point; six numbers of the map are taken from them.
     freedom = max(1, 2 * len(points) - 6)
-    fitted = PixelMap(
+    return PixelMap(
         as_matrix(solution.T),
         as_pair(centre_um),
         as_pair(centre_px),
         math.sqrt(float(np.sum((root * error) ** 2)) / freedom),
         as_matrix(np.linalg.inv((root * away).T @ (root * away))),
         len(points),
+        axis_px,
+        bend_px2,
     )
-    return fitted, np.asarray(np.linalg.norm(error, axis=1))
 
 
-def _inliers(points: Floats, seen: Floats, weights: Floats) -> npt.NDArray[np.bool_]:
+def _more_bend(fitted: PixelMap, points: Floats, seen: Floats, weights: Floats) -> float:
+    """Return by how much more the lens bends than a map says, a straight map left aside."""
+    straight = straightened(fitted.to_px(points), fitted.axis_px, fitted.bend_px2)
+    away = straight - fitted.axis_px
+    moved = away * (away * away).sum(axis=1, keepdims=True)
+    root = np.sqrt(weights)[:, None]
+    flat = np.column_stack([np.ones(len(points)), points - fitted.centre_um]) * root
+    moved, left = root * moved, root * (seen - fitted.to_px(points))
+    moved = moved - flat @ np.linalg.lstsq(flat, moved, rcond=None)[0]
+    usual = BENT_PART / math.hypot(*fitted.axis_px) ** 2
+    # A lens bends by some per cent at most: what the points do not tell is taken to be none.
+    unsure = (SURE_PX / usual) ** 2
+    return float(np.sum(moved * left) - unsure * fitted.bend_px2) / float(
+        np.sum(moved * moved) + unsure
+    )
+
+
+def _inliers(
+    points: Floats, seen: Floats, weights: Floats, axis_px: Pair | None
+) -> npt.NDArray[np.bool_]:
     """Return which sightings agree with most of the others (least median of squares)."""
     best_px, kept = math.inf, np.ones(len(points), dtype=np.bool_)
-    for triple in _triples(len(points)):
-        corners = np.column_stack([points[triple], np.ones(3)])
-        if abs(np.linalg.det(corners)) < 1e-6 * max(1.0, float(np.ptp(points)) ** 2):
-            continue
-        affine = np.linalg.solve(corners, seen[triple])
-        off_px = np.linalg.norm(
-            np.column_stack([points, np.ones(len(points))]) @ affine - seen, axis=1
-        )
-        middle_px = float(np.median(off_px))
-        if middle_px < best_px:
-            best_px, kept = middle_px, off_px <= max(2.0 * OUTLIER_PX, 4.0 * middle_px)
+    for straight in _straight_ways(seen, axis_px):
+        for triple in _triples(len(points)):
+            corners = np.column_stack([points[triple], np.ones(3)])
+            if abs(np.linalg.det(corners)) < 1e-6 * max(1.0, float(np.ptp(points)) ** 2):
+                continue
+            affine = np.linalg.solve(corners, straight[triple])
+            off_px = np.linalg.norm(
+                np.column_stack([points, np.ones(len(points))]) @ affine - straight, axis=1
+            )
+            middle_px = float(np.median(off_px))
+            if middle_px < best_px:
+                best_px, kept = middle_px, off_px <= max(2.0 * OUTLIER_PX, 4.0 * middle_px)
     for _ in range(3):
         if kept.sum() < FEWEST_POINTS:
             return kept
-        fitted, near_px = _least_squares(points[kept], seen[kept], weights[kept])
+        fitted, near_px = _least_squares(points[kept], seen[kept], weights[kept], axis_px)
         off_px = np.linalg.norm(fitted.to_px(points) - seen, axis=1)
         limit_px = max(OUTLIER_PX, 4.0 * float(np.median(near_px)))
         kept = off_px <= limit_px
     return kept
+
+
+def _straight_ways(seen: Floats, axis_px: Pair | None) -> list[Floats]:
+    """Return what was seen, put straight for lenses that bend by different amounts."""
+    if axis_px is None:
+        return [seen]
+    corner = math.hypot(*axis_px) ** 2
+    return [straightened(seen, axis_px, part / corner) for part in BENT_PARTS]
 
 
 def _triples(count: int) -> Iterator[list[int]]:

@@ -44,6 +44,8 @@ class _Plane(StrictModel):
     centre_px: Pair
     matrix_px_um: Matrix
     leverage_um2: Matrix
+    axis_px: Pair = (0.0, 0.0)
+    bend_px2: float = Field(default=0.0, ge=-1e-6, le=1e-6)
     outliers: Annotated[tuple[str, ...], Field(strict=False)] = ()
 
     @model_validator(mode="after")
@@ -66,6 +68,8 @@ class _Plane(StrictModel):
             self.noise_px,
             self.leverage_um2,
             self.points,
+            self.axis_px,
+            self.bend_px2,
         )
         fit = MapFit(fitted, self.residual_rms_px, self.residual_max_px, self.outliers)
         return Plane(self.zoom_counts, self.height_um, fit, self.measured)
@@ -170,6 +174,8 @@ def _plane_values(plane: Plane) -> dict[str, object]:
         "centre_px": fit.map.centre_px,
         "matrix_px_um": fit.map.matrix_px_um,
         "leverage_um2": fit.map.leverage_um2,
+        "axis_px": fit.map.axis_px,
+        "bend_px2": fit.map.bend_px2,
         "outliers": fit.outliers,
     }
 

@@ -1,7 +1,8 @@
-"""From the platform to the image and back: an affine map that knows how sure it is."""
+"""From the platform to the image and back: a map that knows how sure it is."""
 
 import math
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,8 @@ class PixelMap:
         Inverse of the sum of squares of the measured points about their mean; 1/um^2.
     points : int
         How many points it rests on.
+    axis_px, bend_px2 : (float, float), float
+        The lens moves what lies r pixels from there outwards by `bend_px2` times r cubed.
     """
 
     matrix_px_um: Matrix
@@ -38,6 +41,8 @@ class PixelMap:
     noise_px: float
     leverage_um2: Matrix
     points: int
+    axis_px: Pair = (0.0, 0.0)
+    bend_px2: float = 0.0
 
     @property
     def scale_um_px(self) -> float:
@@ -74,11 +79,17 @@ class PixelMap:
     def to_px(self, platform_um: npt.ArrayLike) -> Floats:
         """Return where points are seen; shape (..., 2), as x, y."""
         away = np.asarray(platform_um, dtype=np.float64) - self.centre_um
-        return np.asarray(away @ np.array(self.matrix_px_um).T + self.centre_px)
+        straight = np.asarray(away @ np.array(self.matrix_px_um).T + self.centre_px)
+        return bent(straight, self.axis_px, self.bend_px2)
 
     def to_um(self, image_px: npt.ArrayLike) -> Floats:
         """Return which points are seen at points of the image; shape (..., 2), as x, y."""
-        away = np.asarray(image_px, dtype=np.float64) - self.centre_px
+        seen = np.asarray(image_px, dtype=np.float64)
+        return self.straight_um(straightened(seen, self.axis_px, self.bend_px2))
+
+    def straight_um(self, straight_px: Floats) -> Floats:
+        """Return which points a lens that bends nothing would show at points of the image."""
+        away = straight_px - self.centre_px
         return np.asarray(away @ np.linalg.inv(np.array(self.matrix_px_um)).T + self.centre_um)
 
     def std_um(self, image_px: npt.ArrayLike) -> Floats:
@@ -95,14 +106,37 @@ class PixelMap:
     def for_window(self, *, x_px: int = 0, y_px: int = 0, binning: int = 1) -> "PixelMap":
         """Return the map for images read from `x_px`, `y_px` on, in binned pixels."""
         middle = 0.5 * (binning - 1)
-        u_px, v_px = self.centre_px
+        (u_px, v_px), (axis_x_px, axis_y_px) = self.centre_px, self.axis_px
         matrix = np.array(self.matrix_px_um) / binning
         return replace(
             self,
             matrix_px_um=as_matrix(matrix),
             centre_px=((u_px - middle) / binning - x_px, (v_px - middle) / binning - y_px),
             noise_px=self.noise_px / binning,
+            axis_px=((axis_x_px - middle) / binning - x_px, (axis_y_px - middle) / binning - y_px),
+            bend_px2=self.bend_px2 * binning**2,
         )
+
+
+STRAIGHTENED: Final = 8
+"""Rounds in which what a lens bends is put straight; each leaves a tenth of the rest at most."""
+
+
+def bent(straight_px: Floats, axis_px: Pair, bend_px2: float) -> Floats:
+    """Return where a lens shows what a straight map has at points of the image; shape (..., 2)."""
+    if not bend_px2:
+        return straight_px
+    away = straight_px - axis_px
+    square = (away * away).sum(axis=-1, keepdims=True)
+    return np.asarray(straight_px + away * (bend_px2 * square))
+
+
+def straightened(seen_px: Floats, axis_px: Pair, bend_px2: float) -> Floats:
+    """Return what `bent` makes of it; shape (..., 2)."""
+    straight = seen_px
+    for _ in range(STRAIGHTENED if bend_px2 else 0):
+        straight = seen_px - (bent(straight, axis_px, bend_px2) - straight)
+    return straight
 
 
 def _determinant(matrix: Matrix) -> float:
@@ -138,7 +172,7 @@ def between(first: PixelMap, second: PixelMap, share: float) -> PixelMap:
     size = [math.exp(-each) for each in (log_one, log_scale, log_other)]
     alike = math.isclose(size[0], size[2], rel_tol=1e-3)
     weight = share if alike else (size[1] - size[0]) / (size[2] - size[0])
-    point_um = (1.0 - weight) * first.to_um(seen_px) + weight * second.to_um(seen_px)
+    point_um = (1.0 - weight) * first.straight_um(seen_px) + weight * second.straight_um(seen_px)
     unsure = max(first, second, key=lambda each: float(np.trace(each.leverage_um2)))
     return PixelMap(
         as_matrix(matrix),
@@ -147,4 +181,6 @@ def between(first: PixelMap, second: PixelMap, share: float) -> PixelMap:
         max(first.noise_px, second.noise_px),
         unsure.leverage_um2,
         min(first.points, second.points),
+        second.axis_px if second.bend_px2 else first.axis_px,
+        (1.0 - share) * first.bend_px2 + share * second.bend_px2,
     )
