@@ -3,12 +3,14 @@
     python tools/resolve_platforms.py                       # the core and every extra, everywhere
     python tools/resolve_platforms.py --core windows:3.14 aarch64-manylinux_2_39:3.11
     python tools/resolve_platforms.py --table               # for docs/reference/platforms.md
+    python tools/resolve_platforms.py --released            # when each package was released
 
 Needs uv and the network. Ends with 0 where everything that is promised resolves or where there is
 nothing to resolve with (it says "skipped"), with 1 where not.
 """
 
 import argparse
+import re
 import shutil
 import subprocess
 import sys
@@ -31,6 +33,7 @@ PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 CORE = "core"
 NOT_FOR_USERS = ("dev", "docs")
 AT_ONCE = 4
+LONGEST_PROBLEM = 300
 UNREACHABLE = ("Failed to fetch", "error sending request", "dns error", "No route", "timed out")
 
 
@@ -85,7 +88,7 @@ def resolve(uv: str, task: Task, lines: list[str], within_s: float) -> Answer:
         return Answer(task, "")
     if any(word in done.stderr for word in UNREACHABLE):
         raise NoNetworkError(done.stderr.strip())
-    return Answer(task, " ".join(done.stderr.split()))
+    return Answer(task, " ".join(done.stderr.split())[:LONGEST_PROBLEM])
 
 
 def resolve_place(
@@ -119,6 +122,45 @@ def table(answers: list[Answer]) -> str:
     return "\n".join(lines)
 
 
+def released(uv: str, within_s: float) -> list[str]:
+    """Return name, version and date of each package that is asked for, as the resolver locks it.
+
+    The versions are those of constraints.txt, as far as they are there for every Python.
+    """
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    lines = {line for part in requirements().values() for line in part}
+    pinned = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pinned = [line for line in pinned if re.match(r"[\w.-]+==", line)]
+    with tempfile.TemporaryDirectory() as folder:
+        asked = Path(folder) / "pyproject.toml"
+        asked.write_text(
+            f'[project]\nname = "asked"\nversion = "0"\n'
+            f'requires-python = "{project["requires-python"]}"\n'
+            f"dependencies = {sorted(lines)}\n[tool.uv]\nconstraint-dependencies = {pinned}\n",
+            encoding="utf-8",
+        )
+        done = subprocess.run(
+            [uv, "lock", "--quiet"],
+            capture_output=True,
+            text=True,
+            timeout=within_s,
+            check=False,
+            cwd=folder,
+        )
+        if done.returncode != 0:
+            raise NoNetworkError(done.stderr.strip())
+        locked = tomllib.loads((Path(folder) / "uv.lock").read_text(encoding="utf-8"))
+    names = {re.split(r"[^\w.-]", line)[0].lower().replace("_", "-") for line in lines}
+    told = []
+    for each in locked["package"]:
+        if each["name"] not in names:
+            continue
+        files = [*each.get("wheels", []), *filter(None, [each.get("sdist")])]
+        dates = sorted(str(file["upload-time"])[:10] for file in files if "upload-time" in file)
+        told.append(f"{each['name']} {each['version']} {dates[0] if dates else 'unknown'}")
+    return told
+
+
 def say(text: str) -> None:
     """Tell it on standard output."""
     sys.stdout.write(text + "\n")
@@ -129,12 +171,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--core", action="store_true", help="without the extras")
     parser.add_argument("--table", action="store_true", help="print a table for the docs")
+    parser.add_argument("--released", action="store_true", help="say when each was released")
     parser.add_argument("--within", type=float, default=120.0, metavar="SECONDS", help="of each")
     parser.add_argument("places", nargs="*", metavar="PLATFORM:PYTHON")
     chosen = parser.parse_args()
     uv = find_uv()
     if uv is None:
         say("resolving for other platforms: skipped, there is no uv")
+        return 0
+    if chosen.released:
+        say("\n".join(released(uv, chosen.within)))
         return 0
     parts = requirements()
     if chosen.core:

@@ -26,6 +26,7 @@ if "%~1"=="dev" set "what=%root%[dev]"
 echo Installing what CoSMic needs into .venv (the first time takes a minute or more) ... 1>&2
 "%venv%\Scripts\python.exe" -m pip install --quiet --no-input --disable-pip-version-check ^
     --constraint "%root%\constraints.txt" --editable "%what%" || goto not_installed
+if "%~1"=="run" "%venv%\Scripts\python.exe" "%root%\tools\install_extras.py"
 copy /y "%key%" "%venv%\.cosmic-run" >nul
 if "%~1"=="dev" copy /y "%key%" "%stamp%" >nul
 exit /b 0

@@ -167,34 +167,10 @@ installation_key() {
     cksum "$root/pyproject.toml" "$root/constraints.txt"
 }
 
-# Prints the extras that a user may want, in one line.
-user_extras() {
-    "$venv/bin/python" - "$root/pyproject.toml" <<'END'
-import sys, tomllib
-with open(sys.argv[1], "rb") as file:
-    extras = tomllib.load(file)["project"]["optional-dependencies"]
-print(*(name for name in extras if name not in ("dev", "docs")))
-END
-}
-
 # pip_install WHAT...: into the environment, at the versions of constraints.txt.
 pip_install() {
     "$venv/bin/python" -m pip install --quiet --no-input --disable-pip-version-check \
         --constraint "$root/constraints.txt" "$@"
-}
-
-# Installs the extras that have a wheel here; says which have not, and how to try again.
-install_extras() {
-    extras=$(user_extras)
-    all=$(printf '%s' "$extras" | tr ' ' ',')
-    pip_install --only-binary :all: --editable "${root}[$all]" 2>/dev/null && return 0
-    without=
-    for extra in $extras; do
-        pip_install --only-binary :all: --editable "${root}[$extra]" 2>/dev/null ||
-            without="$without $extra"
-    done
-    [ -z "$without" ] || say "Not installed, for want of wheels for this computer:$without.
-CoSMic runs without; to see why: $venv/bin/python -m pip install 'cosmic[NAME]'"
 }
 
 # --- both -------------------------------------------------------------------------------------
@@ -223,7 +199,7 @@ prepare() {
     say "Installing what CoSMic needs into .venv (the first time takes a minute or more) ..."
     pip_install --editable "$what" ||
         die "The installation did not succeed: see above; it needs the network the first time."
-    if [ "$1" = run ]; then install_extras; fi
+    if [ "$1" = run ]; then "$venv/bin/python" "$root/tools/install_extras.py"; fi
     find_venv_version
     installation_key >"$venv/.cosmic-run"
     if [ "$1" = dev ]; then cp -- "$venv/.cosmic-run" "$stamp"; fi

@@ -183,3 +183,42 @@ def test_a_package_that_is_missing_is_named_with_how_to_install_it(
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(NotConnectedError, match=rf"{module} is missing.*cosmic\[{backend}\]"):
         make_controller(backend, options=options)
+
+
+def test_a_stage_without_a_sensor_needs_no_positions(pylablib):
+    _, package = pylablib
+    options = package.controller_options().stages[3]
+    open_loop = [{"axis": 1, "kind": "open-loop", "unit": "step"}]
+    options = type(options).model_validate({**options.model_dump(), "axes": open_loop})
+    picomotor = package.picomotor
+
+    def without_position(conn):
+        device = picomotor(conn)
+        device.get_position = device.move_to = None
+        return device
+
+    package.picomotor = without_position
+    pylablib_stages.PylablibUnit(options, package).close()
+
+
+def test_a_package_that_a_class_of_pylablib_needs_is_named(monkeypatch, tmp_path):
+    for name, text in {
+        "pylablib/__init__.py": "__version__ = '1.4.3'",
+        "pylablib/core/devio/base.py": "class DeviceError(Exception): pass",
+        "pylablib/devices/Thorlabs.py": "import a_compiler",
+    }.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    for name in [each for each in sys.modules if each.partition(".")[0] == "pylablib"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.syspath_prepend(tmp_path)
+    before = set(sys.modules)
+    try:
+        package = pylablib_stages.InstalledPackage()
+        with pytest.raises(NotConnectedError, match="needs the package a_compiler"):
+            package.device_class("Thorlabs.KinesisMotor")
+        with pytest.raises(NotConnectedError, match=r"no device 'Thorlab.KinesisMotor'"):
+            package.device_class("Thorlab.KinesisMotor")
+    finally:
+        for name in set(sys.modules) - before:
+            del sys.modules[name]

@@ -2,6 +2,7 @@
 
 import os
 import re
+import runpy
 import shutil
 import subprocess
 from pathlib import Path
@@ -55,6 +56,29 @@ def test_windows_installs_the_same_and_notices_the_same_changes() -> None:
         assert words in here
     for stamp in ("run", "dev"):
         assert f".cosmic-{stamp}" in there
+    assert r"tools\install_extras.py" in there
+    assert "tools/install_extras.py" in here
+
+
+def test_extras_without_a_wheel_are_named_and_the_others_are_installed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = []
+
+    def pip(command: list[str], **_: object) -> subprocess.CompletedProcess[str]:
+        assert "--constraint" in command
+        extras = command[-1].partition("[")[2].rstrip("]").split(",")
+        asked.append(extras)
+        return subprocess.CompletedProcess(command, int("video" in extras))
+
+    monkeypatch.setattr(subprocess, "run", pip)
+    assert runpy.run_path(str(ROOT / "tools" / "install_extras.py"))["main"]() == 0
+    assert ["video"] in asked
+    assert ["net"] in asked
+    said = capsys.readouterr().err
+    assert "for want of wheels for this computer: video." in said
+    assert "pi, because installing it accepts PI's licence" in said
+    assert not any({"pi", "dev", "docs"} & set(each) for each in asked)
 
 
 @pytest.mark.parametrize("name", ["run.cmd", "test.cmd", "tools/setup.cmd"])

@@ -21,7 +21,8 @@ from cosmic.mico.hw.stages import AxisOptions, StageController, StageUnit
 
 _AXIS_NAMES: Final = ("axis", "channel")
 _NO_WAIT: Final = ("sync", "wait")
-_NEEDED: Final = ("get_position", "move_to", "move_by", "is_moving", "stop", "close")
+_NEEDED: Final = ("move_by", "is_moving", "stop", "close")
+_NEEDED_WITH_SENSOR: Final = ("get_position", "move_to")
 _LOST: Final = re.compile("backend|timeout|serial|connection", re.IGNORECASE)
 
 
@@ -79,13 +80,24 @@ class InstalledPackage(Package):
             found: Callable[..., Any] = getattr(
                 importlib.import_module(f"pylablib.devices.{module}"), kind
             )
-        except (ImportError, AttributeError) as exc:
+        except ModuleNotFoundError as exc:
+            if str(exc.name).startswith("pylablib"):
+                raise self._no_device(name, exc) from exc
             raise NotConnectedError(
-                f"pylablib has no device {name!r} ({exc}); it is written as in its documentation, "
-                'such as "Thorlabs.KinesisMotor"',
-                fault=DeviceFault.UNSUPPORTED,
+                f"{name} of pylablib needs the package {exc.name}: pip install {exc.name}",
+                fault=DeviceFault.COMMUNICATION,
             ) from exc
+        except (ImportError, AttributeError) as exc:
+            raise self._no_device(name, exc) from exc
         return found
+
+    @staticmethod
+    def _no_device(name: str, reason: Exception) -> NotConnectedError:
+        return NotConnectedError(
+            f"pylablib has no device {name!r} ({reason}); it is written as in its documentation, "
+            'such as "Thorlabs.KinesisMotor"',
+            fault=DeviceFault.UNSUPPORTED,
+        )
 
 
 class PylablibUnit(StageUnit):
@@ -106,7 +118,9 @@ class PylablibUnit(StageUnit):
                 "and that no other program uses it",
                 fault=DeviceFault.COMMUNICATION,
             ) from exc
-        missing = [name for name in _NEEDED if not self._has(name)]
+        sensor = any(each.kind != "open-loop" for each in self.axes)
+        needed = _NEEDED + _NEEDED_WITH_SENSOR * sensor
+        missing = [name for name in needed if not self._has(name)]
         if missing:
             self._device.close()
             raise NotConnectedError(
