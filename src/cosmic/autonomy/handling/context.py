@@ -382,10 +382,10 @@ class HandlingContext:
         """
         positions = self.settings.places
         lowest = -positions.stray_um
-        if HEIGHTS in self.calibration.made:
+        if HEIGHTS in self.calibration.made or self.settings.gripper in self.calibration.up_um:
             lowest = max(lowest, positions.lowest_um - positions.grasp_um)
             if not held and self.stray_um <= lowest:
-                self.calibration.made.pop(HEIGHTS)
+                self.calibration.made.pop(HEIGHTS, None)
                 self.calibration.registry.forget(HEIGHTS, self.settings.gripper)
                 self.stray_um = 0.0
                 return

@@ -73,10 +73,10 @@ class PositionSettings(StrictModel):
 
     travel_um: float = Field(400.0, gt=0.0)
     grasp_um: float = 7.0
-    lower_um: float = Field(5.0, ge=0.0)
+    lower_um: float = Field(3.0, ge=0.0)
     raise_um: float = Field(0.8, ge=0.0)
     stray_um: float = Field(18.0, ge=0.0)
-    lowest_um: float = 2.0
+    lowest_um: float = 3.0
     test_um: float = Field(120.0, gt=0.0)
     test_aside_um: float = Field(150.0, gt=0.0)
     hold_x_um: float = 0.0
