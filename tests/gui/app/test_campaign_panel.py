@@ -137,6 +137,8 @@ def test_one_that_was_stopped_is_shown_as_stopped_and_resume_goes_on_in_its_fold
     assert panel.board.state.text() == "stopped"
     assert "a hand on the button" in panel.procedure.reason.text()
     assert panel.procedure.resume.isEnabled()
+    assert panel.message.text() == "Resume goes on in here; Start begins a new one"
+    assert panel.message.isVisible()
     panel.recipe.setCurrentText("quick")  # what is chosen meanwhile is for the next one
     press(qtbot, panel.procedure.resume)
     assert opened[-1] == (first.recipe, tmp_path / "here")
@@ -146,6 +148,7 @@ def test_one_that_was_stopped_is_shown_as_stopped_and_resume_goes_on_in_its_fold
     panel.procedure.refresh()
     assert panel.board.state.text() == "ended"
     assert not panel.procedure.resume.isEnabled(), "it did what was asked"
+    assert not panel.message.text()
 
 
 def test_a_finished_fibre_is_shown_and_can_be_replayed(panel, qtbot, tmp_path) -> None:

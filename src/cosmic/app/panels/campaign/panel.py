@@ -292,6 +292,11 @@ class CampaignPanel(QWidget):
         )
         if campaign.over and not self.folder.isModified():
             self._suggest_folder()
+        if campaign.unfinished and not self.message.toolTip():
+            self.message.set_text(
+                f"Resume goes on in {campaign.store.folder.name}; Start begins a new one"
+            )
+            self.message.show()
 
     # Looking at what there is
 
