@@ -196,7 +196,7 @@ def test_the_next_good_command_takes_the_refusal_away(panel: MicoWidget, qtbot: 
     click(qtbot, card, "MiCoCL_9")
     assert not entry.reason
     wait_for_position(qtbot, card, 10.0)
-    qtbot.waitUntil(lambda: "travel" in part(card, "status", QLabel).text())
+    qtbot.waitUntil(lambda: part(card, "status", QLabel).text() == "±5500 µm travel")
 
 
 def test_the_badge_says_busy_while_it_moves_and_stop_ends_only_that_axis(qtbot: QtBot) -> None:

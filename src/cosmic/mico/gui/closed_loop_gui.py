@@ -152,9 +152,11 @@ class ClosedLoopGUI(PositionerBaseGUI):
         limits = state.shown_limits
         if limits is None:
             return ""
-        low, high = (format_quantity(limit, state.unit) for limit in limits)
+        low, high = limits
+        span = f"±{high:g}" if low == -high else f"{low:g} to {high:g}"
+        unit = format_quantity(high, state.unit).split(" ")[-1]
         zero = f", zero at {format_quantity(state.zero, state.unit)}" if state.zero else ""
-        return f"travel {low.split(' ')[0]} to {high}{zero}"
+        return f"{span} {unit} travel{zero}"  # what is cut off in a narrow window is the word
 
     # Commanding
 
