@@ -9,6 +9,7 @@ import sys
 from bluesky import RunEngine
 from bluesky.plans import scan
 from ophyd import EpicsMotor, EpicsSignal, EpicsSignalRO
+from ophyd.areadetector.plugins import ImagePlugin
 from ophyd.signal import EpicsSignalBase
 from ophyd.utils import LimitError, UnknownStatusFailure, WaitTimeoutError
 
@@ -27,6 +28,20 @@ def moved(target: float, of: EpicsMotor) -> object:
 def tell(found: dict[str, object]) -> None:
     sys.stdout.write(json.dumps(found) + "\n")
     sys.stdout.flush()
+
+
+def seen() -> dict[str, object]:
+    """Return what areaDetector's own classes say of an image."""
+    image = ImagePlugin("COSMIC:microscope:image:", name="image")
+    image.wait_for_connection(timeout=PATIENCE_S)
+    array = image.image
+    return {
+        "shape": list(array.shape),
+        "mean": float(array.mean()),
+        "kind": image.data_type.get(),
+        "colours": image.color_mode.get(as_string=True),
+        "of": image.nd_array_port.get(),
+    }
 
 
 def _main() -> None:
@@ -54,6 +69,7 @@ def _main() -> None:
         motor.set(1e6)
     except LimitError as exc:
         found["beyond"] = type(exc).__name__
+    found["image"] = seen()
     tell(found)
     sys.stdin.readline()
     stopped = {

@@ -106,6 +106,14 @@ def test_ophyds_motor_drives_an_axis_unchanged(served: Served, tmp_path: Path) -
         assert found["units"] == ["um", "deg"]
         assert found["limits"] == [-5500.0, 5500.0]
         assert found["beyond"] == "LimitError"
+        height, width = tifffile.imread(
+            io.BytesIO(served.http.get("/api/images/microscope.tif").content)
+        ).shape
+        image = found["image"]
+        assert image["shape"] == [height, width]
+        assert 20.0 < image["mean"] < 250.0
+        assert (image["kind"], image["colours"]) == ("UInt8", "Mono")
+        assert image["of"] == "microscope"
         assert served.http.post("/api/mico/stop", json={"reason": "test"}).is_success
         client.stdin.write("\n")
         client.stdin.flush()

@@ -10,12 +10,11 @@ from math import inf, isfinite
 from threading import Lock
 from typing import Any, Final, get_args
 
-import numpy as np
-
 from cosmic.app.configuration.gateways import EpicsSettings
 from cosmic.app.gateways import epics_channels as ca
 from cosmic.app.gateways.catalogue import Command, commands_of
 from cosmic.app.gateways.epics_channels import Channel, ChannelServer, Who
+from cosmic.app.gateways.epics_image import ImageRecord
 from cosmic.app.gateways.epics_motor import MotorRecord, ValueRecord
 from cosmic.app.gateways.plain import to_json
 from cosmic.app.gateways.session import Approve, GatewaySession
@@ -35,12 +34,12 @@ from cosmic.frame.operation import Operation
 from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.hw.interface import PositionerKind
 from cosmic.vico.api.sent_image import SentImage
+from cosmic.vico.hw.interface import PixelFormat
 
 logger = logging.getLogger(__name__)
 
 SHOWN_EVERY_S: Final = 0.04
 IMAGES_EVERY_S: Final = 0.5
-LARGEST_IMAGE: Final = 4_000_000
 MOST_WAITING: Final = 32
 _PLAIN: Final = (bool, int, float, str)
 
@@ -82,7 +81,7 @@ class EpicsGateway:
         self._motors: dict[str, MotorRecord] = {}
         self._values: dict[str, ValueRecord] = {}
         self._states: dict[tuple[str, ...], Channel] = {}
-        self._images: dict[str, tuple[Channel, Channel, Channel, Channel]] = {}
+        self._images: dict[str, ImageRecord] = {}
         self._looked = 0
         self._going: dict[tuple[str, tuple[str, ...]], list[Operation[Any]]] = {}
         self._control = ca.whole(put=self._take)
@@ -156,10 +155,10 @@ class EpicsGateway:
             yield from record.channels.items()
         for camera in values.get("camera_handles", {}) if name == "vico" else ():
             base = f"{self._prefix}{_plain(camera)}:image:"
-            found = (ca.pixels(LARGEST_IMAGE), ca.whole(), ca.whole(), ca.whole())
-            self._images[camera] = found
-            names = ("ArrayData", "ArraySize0_RBV", "ArraySize1_RBV", "UniqueId_RBV")
-            yield from zip((base + each for each in names), found, strict=True)
+            settings = values["camera_handles"][camera].get("_settings")
+            kind = settings.pixel_format if settings is not None else PixelFormat.MONO8
+            self._images[camera] = ImageRecord(base, camera, kind)
+            yield from self._images[camera].channels.items()
 
     def _command_channel(self, command: Command, keys: tuple[str, ...]) -> tuple[str, Channel]:
         async def put(who: Who, said: str) -> None:
@@ -308,13 +307,8 @@ class EpicsGateway:
             await ca.show(self._control, int(not payload.local))
         elif isinstance(payload, DataChunk):
             await self._show_samples(payload)
-        elif isinstance(payload, SentImage) and payload.data.size <= LARGEST_IMAGE:
-            array, width, height, number = self._images[payload.camera]
-            await ca.show(width, int(payload.data.shape[1]))
-            await ca.show(height, int(payload.data.shape[0]))
-            if payload.data.dtype == np.uint8:
-                await ca.show(array, payload.data.tobytes())
-            await ca.show(number, payload.frame_id & 0x7FFFFFFF)
+        elif isinstance(payload, SentImage):
+            await self._images[payload.camera].show(payload)
 
     async def _show_state(self, application: str, values: Mapping[str, Any]) -> None:
         if application == "mico":

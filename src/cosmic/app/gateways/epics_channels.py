@@ -118,6 +118,11 @@ def wave(length: int, units: str = "") -> Channel:
     return _guarded(caproto.ChannelDouble(value=[0.0], max_length=length, units=units), None)
 
 
+def wholes(length: int) -> Channel:
+    """Return a channel with an array of whole numbers."""
+    return _guarded(caproto.ChannelInteger(value=[0], max_length=length), None)
+
+
 def pixels(length: int) -> Channel:
     """Return a channel with an array of bytes."""
     return _guarded(caproto.ChannelByte(value=b"\0", max_length=length), None)
