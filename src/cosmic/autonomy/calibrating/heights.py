@@ -15,6 +15,7 @@ from cosmic.autonomy.calibrating.focusing import (
 )
 from cosmic.autonomy.calibrating.registry import CalibrationEntry
 from cosmic.autonomy.handling.context import HEIGHTS, FibreOperation, HandlingContext
+from cosmic.autonomy.handling.force_limit import guard_probe
 from cosmic.autonomy.handling.prepare import clear_image, retract_probe, zoom_to
 from cosmic.autonomy.procedures.operation import Steps, Yielded
 from cosmic.autonomy.tools import tip_um
@@ -195,6 +196,7 @@ def _probe(
     work: HandlingContext, zoom: float, plate_counts: float
 ) -> Generator[Yielded, object, Seen]:
     settings = work.settings.calibration
+    guard_probe(work)
     yield work.go(work.at(work.probe, settings.focus_x_um, settings.focus_y_um))
     return (yield from _seen(work, work.probe, zoom, plate_counts))
 

@@ -10,9 +10,9 @@ from cosmic.autonomy.calibrating.calibrated import Calibrated
 from cosmic.autonomy.calibrating.registry import CalibrationEntry
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
+from cosmic.autonomy.handling.force_limit import arm_force_limit, limit_of, put_back
 from cosmic.autonomy.handling.jaws import CLOSED_STD_UM, mark_gap_unknown, move_jaws, note_gap
 from cosmic.autonomy.handling.prepare import CONTACT, PROBE, retract_probe
-from cosmic.autonomy.handling.push import arm_force_limit, limit_of, put_back
 from cosmic.autonomy.handling.retrying_move import RetryingMove
 from cosmic.autonomy.procedures.operation import Steps, Yielded
 from cosmic.frame.errors import NotAvailable

@@ -18,7 +18,7 @@ from cosmic.autonomy.campaign.statistics import CampaignProgress
 from cosmic.autonomy.campaign.stop_rule import StandardSchedule, StopRule
 from cosmic.autonomy.campaign.store import CampaignStore, NotWrittenError
 from cosmic.autonomy.handling.context import HandlingContext
-from cosmic.autonomy.handling.push import armed_while_pushing
+from cosmic.autonomy.handling.force_limit import armed_beyond_parking
 from cosmic.autonomy.handling.survey import NONE_LEFT
 from cosmic.autonomy.procedures.failures import STOPPED, ProcedureAborted
 from cosmic.autonomy.procedures.operation import OperationFailed
@@ -305,7 +305,7 @@ class Campaign:
         failed = False
         leading = self.work.clock.worker(leads=True)  # between two runs as well
         try:
-            with armed_while_pushing(self.work):
+            with armed_beyond_parking(self.work):
                 self._end_reason = self._treat_all()
         except CosmicError as exc:
             failed, self._end_reason = True, str(exc)

@@ -70,6 +70,8 @@ class SharedWorkspace:
         Where several work, each by its gripper's name.
     seeking : set of str
         Grippers that have begun with a fibre, whether they have chosen it yet or not.
+    parks_limit : bool
+        The force limit is armed only while the probe is out.
     enough : callable
         Says whether no further fibre is to be begun, for a procedure that treats many.
     """
@@ -94,6 +96,7 @@ class SharedWorkspace:
     probe: Resource = field(default_factory=lambda: Resource("the probe", 1))
     arms: "dict[str, HandlingContext]" = field(default_factory=dict)
     seeking: set[str] = field(default_factory=set)
+    parks_limit: bool = False
     enough: Callable[[], bool] = _never
 
     def done_with(self, fibre: HeldFibre) -> None:

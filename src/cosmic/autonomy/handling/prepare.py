@@ -11,6 +11,7 @@ from typing_extensions import override
 from cosmic.autonomy.calibrating.calibrated import Calibrated, Holds
 from cosmic.autonomy.calibrating.registry import CalibrationEntry, CalibrationRegistry
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
+from cosmic.autonomy.handling.force_limit import guard_probe, probe_parked
 from cosmic.autonomy.handling.jaws import in_step, zero_jaws
 from cosmic.autonomy.handling.retrying_move import RetryingMove
 from cosmic.autonomy.handling.tips import TIMES_STD, TipOff, shift_maps, tip_off
@@ -212,8 +213,12 @@ def retract_probe(work: HandlingContext) -> Steps:
     """
     _, y = work.tip_now(work.probe)
     away = work.settings.places.probe_away_y_um
-    if not y < away - 1.0:
-        return
+    if y < away - 1.0:
+        yield from _drawn_back(work, y, away)
+    probe_parked(work)
+
+
+def _drawn_back(work: HandlingContext, y: float, away: float) -> Steps:
     if not work.calibration.touching:
         try:
             yield _probe_to(work, away)
@@ -451,6 +456,7 @@ def beside_jaws(work: HandlingContext) -> Steps:
     yield work.rise(positions.travel_um)
     yield work.go(work.at(work.gripper, hold_x, positions.hold_y_um))
     yield work.go_up(work.hold_tip_um)
+    guard_probe(work)
     beside = hold_x + settings.compare_beside_um * work.jaws.forward
     before = positions.hold_y_um + settings.compare_before_um
     # Aside while it is far back, then straight ahead: nothing is beside its way.

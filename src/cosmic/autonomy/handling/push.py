@@ -1,8 +1,7 @@
 """Pushing a fibre span by span: the force is ready, each span is measured, and fitted."""
 
 import logging
-from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -22,6 +21,7 @@ from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.handling.careful_move import CarefulMove
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
+from cosmic.autonomy.handling.force_limit import arm_force_limit, guard_probe, put_back
 from cosmic.autonomy.handling.grasp import see_held, shape_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.prepare import retract_probe
@@ -29,7 +29,6 @@ from cosmic.autonomy.handling.retrying_move import RetryingMove
 from cosmic.autonomy.handling.settings import PushSettings, StandardSettings
 from cosmic.autonomy.handling.surface import Contact, foresee_off
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Yielded
-from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.errors import DeviceError, NotAvailable
 
 logger = logging.getLogger(__name__)
@@ -435,6 +434,7 @@ class PushSpans(FibreOperation):
         yield from ready_force(work)
         if work.beside_another and not fibre.peak_un:
             work.forces.take_peak_un()  # was that of the fibre before
+        guard_probe(work)
         before = arm_force_limit(work)
         try:
             yield from self._spans(work, fibre)
@@ -465,53 +465,6 @@ def span_limits(work: HandlingContext) -> SpanLimits:
         return push.spans
     longest = min(push.spans.longest_um, push.tilt_longest_um)
     return push.spans.model_copy(update={"longest_um": longest})
-
-
-def limit_of(work: HandlingContext) -> LimitSettings | None:
-    """Return the force limit that is in force for the channel of the probe."""
-    channel = work.settings.push.channel
-    limits = (each.settings for each in work.daqco.limits)
-    return next((each for each in limits if each.channel == channel), None)
-
-
-def arm_force_limit(work: HandlingContext) -> LimitSettings | None:
-    """Arm the force limit of a push, which stops everything; return the one that was there."""
-    push, before = work.settings.push, limit_of(work)
-    if push.stop_un > 0.0:
-        limit = LimitSettings(
-            channel=push.channel, low=-push.stop_un, high=push.stop_un, hysteresis=5.0, armed=True
-        )
-        work.daqco.set_limit(limit)
-    return before
-
-
-def put_back(work: HandlingContext, before: LimitSettings | None) -> None:
-    """Have the force limit as it was before `arm_force_limit`."""
-    now = limit_of(work)
-    if now is None or now == before:
-        return
-    try:
-        work.daqco.set_limit(before or now.model_copy(update={"armed": False}))
-    except NotAvailable as exc:  # nothing is acquired: that has stopped everything already
-        logger.warning("the force limit was not re-armed: %s", exc)
-
-
-@contextmanager
-def armed_while_pushing(work: HandlingContext) -> Iterator[None]:
-    """Have the force limit armed while the probe pushes, and afterwards as it was.
-
-    Between pushes a campaign deals itself with a board or a sensor that fails.
-    """
-    before = limit_of(work)
-    if before is None or not before.armed:
-        yield
-        return
-    logger.warning("the force limit is armed while the probe pushes, until the campaign ends")
-    work.daqco.disarm_limit(before.channel)
-    try:
-        yield
-    finally:
-        put_back(work, before)
 
 
 LEARNED_FROM: Final = 20

@@ -13,6 +13,7 @@ from cosmic.autonomy.bending.result import UN_UM2_PER_N_M2, SpanFit
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
+from cosmic.autonomy.handling.force_limit import arm_force_limit, put_back
 from cosmic.autonomy.handling.grasp import in_jaws, seen_at, shape_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.jaws import move_jaws, note_gap
@@ -20,8 +21,6 @@ from cosmic.autonomy.handling.plate import along
 from cosmic.autonomy.handling.prepare import retract_probe, zoom_to
 from cosmic.autonomy.handling.push import (
     OneSpan,
-    arm_force_limit,
-    put_back,
     ready_force,
     span_limits,
 )

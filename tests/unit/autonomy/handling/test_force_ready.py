@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import pytest
 
-from cosmic.autonomy.handling.context import Calibration
+from cosmic.autonomy.handling.context import Calibration, SharedWorkspace
 from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.push import APART_S, LOOKS, SeeForce
 from cosmic.autonomy.handling.settings import HandlingSettings
@@ -38,6 +38,7 @@ class Work:
         self.calibration = Calibration()
         self.daqco = Daqco()
         self.forces = self
+        self.shared = SharedWorkspace()
         self.failures: list[tuple[str, OperationFailed]] = []
         self.felt = list(felt)
         self.probe_y_um = 1000.0

@@ -93,6 +93,8 @@ class Going(Done):
 class Axis:
     """One of the bench's axes: it is where it was sent."""
 
+    limits = (-5500.0, 5500.0)
+
     def __init__(self, bench: "Bench", name: str) -> None:
         self.bench, self.name = bench, name
 
@@ -116,6 +118,9 @@ class Daqco:
     def set_limit(self, limit: Any) -> None:
         self.armed.append(limit.armed)
         self.limits = [SimpleNamespace(settings=limit)]
+
+    def disarm_limit(self, _channel: str) -> None:
+        self.set_limit(self.limits[0].settings.model_copy(update={"armed": False}))
 
 
 class Bench(HandlingContext):
