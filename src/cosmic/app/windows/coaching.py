@@ -105,7 +105,7 @@ class _Rules:
         """Look whether a campaign works: what seems to be missing then is its own business."""
         if self._rig.running != A_CAMPAIGN:
             return None
-        text = "A campaign runs. It arms the force limit itself while the probe pushes. "
+        text = "A campaign runs. It arms the force limit itself while the probe is out. "
         return Step(text + "Abort leaves things safe; STOP stops at once.")
 
     def lens_unknown(self) -> Step | None:
