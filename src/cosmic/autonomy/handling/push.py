@@ -434,13 +434,16 @@ class PushSpans(FibreOperation):
         yield from ready_force(work)
         if work.beside_another and not fibre.peak_un:
             work.forces.take_peak_un()  # was that of the fibre before
-        guard_probe(work)
+        if not work.beside_another:  # with two arms the probe is never parked between fibres
+            guard_probe(work)
         before = arm_force_limit(work)
         try:
             yield from self._spans(work, fibre)
         finally:
             put_back(work, before)
             fibre.peak_un = max(fibre.peak_un, work.forces.take_peak_un())
+        if work.shared.parks_limit and not work.beside_another:
+            yield from retract_probe(work)
 
     @staticmethod
     def _spans(work: HandlingContext, fibre: HeldFibre) -> Steps:

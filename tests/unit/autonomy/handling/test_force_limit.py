@@ -7,6 +7,7 @@ import pytest
 
 from cosmic.autonomy.handling.force_limit import armed_beyond_parking, guard_probe
 from cosmic.autonomy.handling.prepare import beside_jaws, retract_probe
+from cosmic.autonomy.handling.push import PushSpans
 from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.errors import DeviceError, NotAvailable
 from unit.autonomy.handling.test_push import Bench, carried_out
@@ -83,3 +84,13 @@ def test_what_the_operator_armed_or_not_stands_outside_of_a_campaign() -> None:
     with armed_beyond_parking(bench):
         guard_probe(bench)
         assert not limit(bench).armed
+
+
+def test_after_a_push_the_probe_is_parked_and_what_fails_then_stops_nothing() -> None:
+    bench = platform()
+    with armed_beyond_parking(bench):
+        carried_out(PushSpans().run(bench))
+        away = bench.settings.places.probe_away_y_um
+        assert bench.tip_now(bench.probe)[1] == pytest.approx(away, abs=1.0)
+        assert not limit(bench).armed
+    assert limit(bench) == MINE
