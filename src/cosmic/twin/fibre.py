@@ -16,7 +16,7 @@ from cosmic.twin.fate import Fate
 from cosmic.twin.force_settings import ContactSettings, FibreSettings
 from cosmic.twin.grip import Free, Hold, make_hold
 from cosmic.twin.handling_settings import HandlingSettings
-from cosmic.twin.inelastic import Inelastic
+from cosmic.twin.inelastic import Inelastic, crept_part
 from cosmic.twin.kinematics import Point
 from cosmic.twin.measurand import compliance_weights
 from cosmic.twin.rod import (
@@ -49,6 +49,11 @@ JUMP_UM: Final = 0.35
 
 IMAGE_UN_UM_MM: Final = 0.08
 """Pull of 1 uC/m2 on 1 mm that is 1 um above the plate, uN: its weight, 2 nN, at 40 um."""
+
+MEASURED_AFTER_S: Final = 1.0
+"""After a step: what a bending test is about changes with time."""
+
+MOST_CREEP: Final = 0.3
 
 NOT_INELASTIC: Final = Inelastic(1.0, slope=0.0, yield_curvature=math.inf)
 
@@ -281,7 +286,8 @@ class Fibre:
         places, weights = compliance_weights(hold, abscissa_um)
         across, _, _ = self._section.flexibility(places, hold.fate.roll_rad)
         mean = float(weights @ across) / float(weights.sum())
-        return self.ei_un_um2(time_s) / (EI_UN_UM2_PER_N_M2 * mean)
+        crept = 1.0 + crept_part(self._creep_slope(time_s), MEASURED_AFTER_S)
+        return self.ei_un_um2(time_s) / (EI_UN_UM2_PER_N_M2 * mean * crept)
 
     @property
     def orientation_deg(self) -> float:
@@ -331,16 +337,21 @@ class Fibre:
         """For how long nothing changes that the probe feels, though all stands still."""
         return math.inf if self._inelastic is None else self._inelastic.restless_s
 
+    def _creep_slope(self, time_s: float) -> float:
+        """Return which part of its force goes in each decade of time, in the air of now."""
+        slope: float = self.settings.relaxation_per_decade * self._climate.creep(time_s)
+        return min(slope, MOST_CREEP)
+
     def _new_inelastic(self, time_s: float) -> Inelastic:
         hold = next(iter(self.holds.values()))
         each = self.settings
-        slope = each.relaxation_per_decade * self._climate.creep(time_s)
+        slope = self._creep_slope(time_s)
         if not slope and each.yield_strain >= NEVER_YIELDS:
             return NOT_INELASTIC
         thick = self._section.thickness_um(hold.at_um, hold.fate.roll_rad)
         curvature = 2.0 * each.yield_strain / thick
         length = hold.free.length_um + hold.depth_um
-        made = Inelastic(length, slope=min(slope, 0.3), yield_curvature=curvature)
+        made = Inelastic(length, slope=slope, yield_curvature=curvature)
         made.follow(time_s, 0.0, length, 1.0)
         return made
 

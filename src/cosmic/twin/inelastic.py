@@ -24,6 +24,11 @@ PART_OF_AGE: Final = 0.05
 LATEST_S: Final = 0.5
 
 
+def crept_part(slope: float, after_s: float) -> float:
+    """Return by how much more a fibre has given way so long after a step, of the elastic part."""
+    return slope * float((1.0 - np.exp(-after_s / TIMES_S)).sum())
+
+
 class Inelastic:
     """Creep and set of one fibre in one grip.
 

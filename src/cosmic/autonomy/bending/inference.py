@@ -30,6 +30,9 @@ VARIATION_PRIOR: Final = np.array([0.12, 0.2, 0.24, 0.22, 0.15, 0.07])
 LOW_TAIL, HIGH_TAIL = 0.025, 0.975
 ROUNDS: Final = 60
 UNLIKELY: Final = 1e-3
+TWISTED: Final = 0.25
+"""Of what friction does to a section askew: the part that differs between spans, by twist."""
+
 LEAST_STD: Final = 0.004
 """Of ln(k): a model is no better than this."""
 
@@ -155,6 +158,7 @@ def readings_of(
     sign = np.array([each.sign for each in rows])
     friction = np.array([fits[n].by_friction for n in span]) * sign
     contact = response.by_contact[span]
+    log_k = np.log(k) - _between_ways(span, np.log(k))
     to_common = np.column_stack(
         [
             np.ones(len(k)),
@@ -173,8 +177,13 @@ def readings_of(
     own = _own(response, span, settings, direction)
     if certified is not None:
         own = (*own[2:], ("friction", "", friction, 0.0, settings.friction_std))
+    else:
+        own = (*own, ("friction on a section askew", "", sign, 0.0, settings.askew_std))
+        apart = apart + (TWISTED * settings.askew_std / settings.contact_std_um) ** 2 * (
+            sign[:, None] * sign[None, :] * (span[:, None] == span[None, :])
+        )
     return Readings(
-        log_k=np.log(k),
+        log_k=log_k,
         noise=_noise(fits, rows, settings),
         span=span,
         to_common=to_common,
@@ -184,6 +193,20 @@ def readings_of(
         longest=_longest(response),
         certified=certified,
     )
+
+
+def _between_ways(span: np.ndarray, log_k: Floats) -> Floats:
+    """Return how far the mean ln(k) of both ways of a span lies above that of its mean compliance.
+
+    Friction that holds a section that stands askew takes as much compliance away on the way out
+    as it adds on the way back.
+    """
+    found = np.zeros(len(log_k))
+    for number in set(span.tolist()):
+        both = span == number
+        if both.sum() == 2:
+            found[both] = math.log(math.cosh(0.5 * float(np.ptp(log_k[both]))))
+    return found
 
 
 class _Row(NamedTuple):

@@ -39,6 +39,9 @@ class FitSettings(StrictModel):
         How well the place of the first contact across the fibre repeats.
     friction, friction_std : float
         Between probe and fibre.
+    askew_std : float
+        Part of its compliance that friction takes on the way out, and adds on the way back, from
+        a section that stands askew: its standard deviation over fibres.
     cross_std_part : float
         Of a force along the probe's edge, how much the sensor reads as one across.
     relaxation_part, relaxation_std_part : float
@@ -76,6 +79,7 @@ class FitSettings(StrictModel):
     touch_std_um: float = Field(0.5, gt=0.0)
     friction: float = Field(0.2, ge=0.0, lt=1.0)
     friction_std: float = Field(0.15, ge=0.0)
+    askew_std: float = Field(0.2, ge=0.0, lt=1.0)
     cross_std_part: float = Field(0.02, ge=0.0)
     relaxation_part: float = Field(0.02, ge=0.0)
     relaxation_std_part: float = Field(0.03, ge=0.0)

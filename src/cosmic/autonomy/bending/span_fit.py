@@ -48,6 +48,9 @@ EXPLAINED_TIMES: Final = 3.0
 """So much worse fits what leaves out something that acts."""
 
 MOST_FRICTION: Final = 0.8
+MOST_LOOP: Final = 0.9
+"""Of ln(k): by how much friction on a section askew makes both ways differ."""
+
 MODEL_PART: Final = 0.03
 """Of a stiffness: what both ways may differ by besides."""
 """How little is known of each value without any point; of ln(uN/um), um, uN and uN/s."""
@@ -182,7 +185,7 @@ class _Model:
         """Return what is not known while the friction turns round, at the begin of the way back."""
         points, back = self._points, self.branches[1]
         ahead = points.way_um[back] - values[3]
-        both = [self._force(ahead, values[2], curve) for curve in self.curves]
+        both = [self._force(ahead, values[2 * way], curve) for way, curve in enumerate(self.curves)]
         top = float(np.max(points.way_um))
         stroke = max(top - values[1], 1.0)
         found = np.zeros(len(points.way_um))
@@ -385,16 +388,21 @@ def _flags(
 
 
 def _differs(fit: SpanFit) -> bool:
-    """Return whether loading and unloading differ by more than any friction makes them."""
+    """Return whether loading and unloading differ by more than any friction makes them.
+
+    A ribbon that stands askew goes up or down as it is pushed, and friction holds it: much stiffer
+    on the way out than on the way back, never the other way round.
+    """
     if not (
         math.isfinite(fit.back_std_part) and min(fit.k_loading_un_um, fit.k_unloading_un_um) > 0
     ):
         return False
-    differs = abs(math.log(fit.k_loading_un_um / fit.k_unloading_un_um))
+    differs = math.log(fit.k_loading_un_um / fit.k_unloading_un_um)
     variance = fit.out_std_part**2 + fit.back_std_part**2
     variance -= 2.0 * fit.ways_correlation * fit.out_std_part * fit.back_std_part
     allowed = 2.0 * MOST_FRICTION * abs(fit.by_friction) + MODEL_PART
-    return differs > allowed + CLEAR_SIGMAS * math.sqrt(max(variance, 0.0))
+    allowed += CLEAR_SIGMAS * math.sqrt(max(variance, 0.0))
+    return not -allowed <= differs <= allowed + MOST_LOOP
 
 
 def _gave_way(

@@ -134,7 +134,7 @@ def test_what_is_known_of_the_offset_beforehand_counts_by_its_certainty() -> Non
     assert width_percent(sure) < 0.95 * width_percent(free)
     assert sure.clamp_offset_um == pytest.approx(8.0, abs=0.3)
     assert wrong.clamp_offset_um == pytest.approx(30.0, abs=0.3)
-    assert wrong.ei_n_m2 > 1.1 * DRY
+    assert wrong.ei_n_m2 > 1.08 * DRY
     assert wrong.ei_low_n_m2 > DRY, "what was said beforehand was false, and sure"
 
 
@@ -224,15 +224,26 @@ def test_a_fibre_that_breaks_is_seen() -> None:
 def test_loading_and_unloading_that_differ_are_distinguished() -> None:
     spans = []
     for span in pushed(rig()):
-        force = np.where(span.loading, span.force_un, 0.4 + 0.7 * (span.force_un - 0.4))
+        force = np.where(span.loading, span.force_un, 0.4 + 0.3 * (span.force_un - 0.4))
         spans.append(dataclasses.replace(span, force_un=force))
     found = fit_bending(spans)
     differing = [fit for fit in found.spans if Quality.HYSTERESIS in fit.flags]
     assert len(differing) >= 4
     for fit in differing:
-        assert fit.hysteresis_percent == pytest.approx(30.0 * 0.6, abs=6.0)
-        assert fit.k_unloading_un_um == pytest.approx(0.7 * fit.k_loading_un_um, rel=0.1)
+        assert fit.hysteresis_percent == pytest.approx(70.0 * 0.6, abs=14.0)
+        assert fit.k_unloading_un_um == pytest.approx(0.3 * fit.k_loading_un_um, rel=0.1)
     assert not found.trusted
+
+
+def test_a_way_back_that_is_softer_by_what_friction_holds_askew_is_put_right() -> None:
+    spans = []
+    for span in pushed(rig()):
+        # Friction takes 15 % of the compliance away on the way out, and adds it on the way back.
+        part = np.where(span.loading, 1.0 / 0.85, 1.0 / 1.15)
+        spans.append(dataclasses.replace(span, force_un=0.4 + part * (span.force_un - 0.4)))
+    found, plain = fit_bending(spans), fit_bending(pushed(rig()))
+    assert found.trusted, found.reasons
+    assert found.ei_n_m2 == pytest.approx(plain.ei_n_m2, rel=0.02)
 
 
 def test_a_saturated_sensor_is_reported() -> None:
@@ -290,18 +301,26 @@ def part(span: Span, kept: np.ndarray) -> Span:
 
 
 @pytest.mark.parametrize(
-    "back",
-    [[], [30, 40], [44, 45, 46, 47], [41, 42, 43, 44, 45], [27, 44, 45, 46, 47]],
+    ("back", "half_percent"),
+    [
+        ([], 45.0),
+        ([30, 40], 45.0),
+        ([44, 45, 46, 47], 45.0),
+        ([41, 42, 43, 44, 45], 20.0),
+        ([27, 44, 45, 46, 47], 20.0),
+    ],
     ids=["none", "two", "free", "kink", "one on the fibre"],
 )
-def test_unloading_with_few_points_does_no_harm(back: list[int]) -> None:
+def test_less_is_known_without_a_way_back_for_friction_may_hold_a_section_askew(
+    back: list[int], half_percent: float
+) -> None:
     spans = pushed(rig())
     kept = np.array([*range(24), *back])
     found = fit_bending([part(span, kept) for span in spans])
     whole = fit_bending(spans)
     assert found.ei_n_m2 == pytest.approx(whole.ei_n_m2, rel=0.04)
-    assert width_percent(found) == pytest.approx(width_percent(whole), rel=0.2)
-    assert found.trusted, found.reasons
+    assert width_percent(whole) < width_percent(found) < half_percent
+    assert found.trusted == (width_percent(found) < 30.0), found.reasons
 
 
 def test_a_slip_shows_in_one_point_of_the_way_back() -> None:
