@@ -52,6 +52,7 @@ from cosmic.twin.scene import Scene
 
 NAME = "adversary"
 ROOT = Path(__file__).resolve().parents[1]
+START_S: Final = 60.0
 SCENE = ROOT / "config" / "scenes" / "fiberstation.toml"
 
 
@@ -170,7 +171,11 @@ def attack(
         remote = _Client(endpoint, seed, folder) if client else None
         for thread in threads:
             thread.start()
-        while sum(each.calls for each in attacks) + (remote.total if remote else 0) < commands:
+        # A client takes its time to start on a busy computer, and is what a short run is about too.
+        begun_s = time.monotonic()
+        while sum(each.calls for each in attacks) + (remote.total if remote else 0) < commands or (
+            remote is not None and not remote.begun and time.monotonic() < begun_s + START_S
+        ):
             if time.monotonic() > end_s:
                 break
             time.sleep(0.05)
@@ -205,6 +210,11 @@ class _Client:
                 self.calls = dict(zip(self.calls, map(int, line.split()[1:]), strict=True))
             else:
                 self._raw.append(f"station: {line.strip()}")
+
+    @property
+    def begun(self) -> bool:
+        """Whether it has given commands of each kind."""
+        return all(self.calls.values())
 
     @property
     def total(self) -> int:

@@ -1,6 +1,8 @@
 """A procedure recorded by hand on the twin, and replayed on another fibre with another force."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import PropertyMock, patch
 
 import numpy as np
 import pytest
@@ -47,6 +49,18 @@ def test_movements_by_hand_become_steps_and_are_replayed(tmp_path: Path) -> None
         for name, state in rig.mico.states().items():
             assert state.position == pytest.approx(there[name], abs=2.0), name
         assert (tmp_path / "one_1.h5").exists()
+
+
+def test_a_light_that_becomes_known_was_set_by_nobody() -> None:
+    with cosmic.connect(rate=20.0) as rig:
+        with patch.object(type(rig.vico), "light", PropertyMock()) as light:
+            light.return_value = SimpleNamespace(percent=None)
+            recorder = ProcedureRecorder(rig, rig.handling, lambda: None)
+            light.return_value = SimpleNamespace(percent=50.0)
+            assert not recorder.look()
+            light.return_value = SimpleNamespace(percent=60.0)
+            assert recorder.look()
+        assert [each.words for each in recorder.steps] == ["Light 60 %"]
 
 
 @pytest.mark.slow

@@ -165,8 +165,8 @@ class ProcedureRecorder:
     def _note_light(self) -> None:
         light = self._rig.vico.light
         percent = light.percent if light is not None else None
-        if percent is not None and percent != self._light:
-            self._light = percent
+        before, self._light = self._light, percent if percent is not None else self._light
+        if before is not None and percent is not None and percent != before:
             if self.steps and isinstance(self.steps[-1], LightStep):
                 self.steps.pop()  # a slider that is dragged: the last counts
             self.steps.append(LightStep(percent=round(percent, 1)))
