@@ -244,7 +244,8 @@ def test_plans_trigger_it(rig: VicoRig, tmp_path: Path) -> None:
     status = camera.trigger()
     status.wait(LIMIT_S)
     assert camera.read()["top_mean"]["value"] == 77.0
-    assert set(camera.describe()) == set(camera.read())
+    # The image itself is not read: documents of its file stand for it.
+    assert set(camera.describe()) - set(camera.read()) == {"top_image"}
     assert list(tmp_path.glob("top_*.tif"))
 
 

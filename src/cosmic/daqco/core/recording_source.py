@@ -224,7 +224,10 @@ class RecordingSource:
 
 
 def _cut_off(path: Path) -> RecordingError | None:
-    missing = missing_bytes(path)
+    try:
+        missing = missing_bytes(path)
+    except OSError:  # why it cannot be read is told by whoever asks
+        return None
     if not missing:
         return None
     return RecordingError(
