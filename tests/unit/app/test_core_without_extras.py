@@ -47,10 +47,13 @@ for module in pkgutil.walk_packages(cosmic.__path__, "cosmic."):
 NEEDS_NET = ("cosmic.frame.network.",)
 GATEWAYS = {
     "cosmic.app.gateways.http": {"starlette", "uvicorn"},
+    "cosmic.app.gateways.http_answers": {"starlette"},
     "cosmic.app.gateways.http_server": {"uvicorn"},
+    "cosmic.app.gateways.mcp": {"starlette"},
     "cosmic.app.gateways.websocket_line": {"starlette"},
     "cosmic.app.gateways.epics": {"caproto"},
     "cosmic.app.gateways.epics_channels": {"caproto"},
+    "cosmic.app.gateways.epics_image": {"caproto"},
     "cosmic.app.gateways.epics_motor": {"caproto"},
 }
 NEEDS_PYTEST = ("cosmic.testing.",)
