@@ -118,6 +118,8 @@ class Readings:
         standard deviation.
     repeat : ndarray, shape (m, m), float64
         Covariance by places of contact that do not repeat.
+    askew : ndarray, shape (m, m), float64
+        Covariance by friction that holds a section that stands askew; a standard is round.
     """
 
     log_k: Floats
@@ -126,6 +128,7 @@ class Readings:
     to_common: Floats
     own: tuple[tuple[str, str, Floats, float, float], ...]
     repeat: Floats
+    askew: Floats
     response: Response
     longest: int
     certified: tuple[float, float] | None = None
@@ -158,41 +161,55 @@ def readings_of(
     sign = np.array([each.sign for each in rows])
     friction = np.array([fits[n].by_friction for n in span]) * sign
     contact = response.by_contact[span]
-    log_k = np.log(k) - _between_ways(span, np.log(k))
-    to_common = np.column_stack(
+    to_common = _to_common(fits, rows, friction, response, part)
+    if certified is not None:
+        # Glass rubs otherwise than fibres do.
+        to_common[:, FRICTION] = 0.0
+    same = span[:, None] == span[None, :]
+    own = _own(response, span, settings, direction)
+    if certified is not None:
+        own = (*own[2:], ("friction", "", friction, 0.0, settings.friction_std))
+    return Readings(
+        log_k=np.log(k) - _between_ways(span, np.log(k)),
+        noise=_noise(fits, rows, settings),
+        span=span,
+        to_common=to_common,
+        own=own,
+        repeat=np.outer(contact, contact) * same * settings.contact_std_um**2,
+        askew=np.zeros_like(same, dtype=float) if certified else _askew(sign, same, settings),
+        response=response,
+        longest=_longest(response),
+        certified=certified,
+    )
+
+
+def _to_common(
+    fits: Sequence[SpanFit],
+    rows: Sequence["_Row"],
+    friction: Floats,
+    response: Response,
+    part: float,
+) -> Floats:
+    """Return what the readings answer to the common parameters, a row for each reading."""
+    span = np.array([each.span for each in rows])
+    k = np.array([each.k_un_um for each in rows])
+    return np.column_stack(
         [
             np.ones(len(k)),
             np.full(len(k), part),
             friction,
             -k,
-            contact,
+            response.by_contact[span],
             response.slopes[span],
             np.array([_aside(fits[each.span], each.sign) for each in rows]),
         ]
     )
-    if certified is not None:
-        # Glass rubs otherwise than fibres do.
-        to_common[:, FRICTION] = 0.0
-    apart = contact[:, None] * contact[None, :] * (span[:, None] == span[None, :])
-    own = _own(response, span, settings, direction)
-    if certified is not None:
-        own = (*own[2:], ("friction", "", friction, 0.0, settings.friction_std))
-    else:
-        own = (*own, ("friction on a section askew", "", sign, 0.0, settings.askew_std))
-        apart = apart + (TWISTED * settings.askew_std / settings.contact_std_um) ** 2 * (
-            sign[:, None] * sign[None, :] * (span[:, None] == span[None, :])
-        )
-    return Readings(
-        log_k=log_k,
-        noise=_noise(fits, rows, settings),
-        span=span,
-        to_common=to_common,
-        own=own,
-        repeat=apart * settings.contact_std_um**2,
-        response=response,
-        longest=_longest(response),
-        certified=certified,
-    )
+
+
+def _askew(sign: Floats, same: np.ndarray, settings: FitSettings) -> Floats:
+    """Return the covariance of ln(k) by what friction takes of it out, and adds back."""
+    each = settings.askew_std**2 * (1.0 + TWISTED**2 * same)
+    return np.asarray(each * np.outer(sign, sign))
 
 
 def _between_ways(span: np.ndarray, log_k: Floats) -> Floats:
@@ -335,7 +352,7 @@ def own_mean(readings: Readings) -> Floats:
 
 def fixed_covariance(readings: Readings, common: Common | None = None) -> Floats:
     """Return the covariance of the readings that no depth and no variation changes."""
-    whole = readings.noise + readings.repeat
+    whole = readings.noise + readings.repeat + readings.askew
     if common is not None:
         whole = whole + readings.to_common @ common.covariance @ readings.to_common.T
     for _, _, column, _, std in readings.own:
@@ -463,6 +480,13 @@ def budget_of(
             settings.contact_std_um,
             "um",
             _root(weights, readings.repeat),
+        ),
+        _line(
+            "friction on a section askew",
+            Kind.B,
+            settings.askew_std,
+            "",
+            _root(weights, readings.askew),
         ),
         _line("stiffness along the fibre", Kind.B, variation, "", _root(weights, varied)),
     ]

@@ -35,6 +35,8 @@ CLOSE_SIGMAS: Final = 2.5
 TINY: Final = 1e-4
 BRANCH_STDS: Final = (5.0, 1000.0)
 BASELINE_STDS: Final = (1000.0, 10.0)
+"""How little is known of each value without any point; of ln(uN/um), um, uN and uN/s."""
+
 TYPICAL_PART: Final = 0.6
 """Of the stroke: where curves are compared."""
 
@@ -53,7 +55,6 @@ MOST_LOOP: Final = 0.9
 
 MODEL_PART: Final = 0.03
 """Of a stiffness: what both ways may differ by besides."""
-"""How little is known of each value without any point; of ln(uN/um), um, uN and uN/s."""
 
 HIGHEST_LOG: Final = 20.0
 """Of a stiffness: beyond any fibre, and short of an overflow."""
