@@ -39,6 +39,7 @@ CALL = "SA_Stop_A"
 SPEED_HZ, WAY_UM, WAY_STEPS = 100, 60.0, 400
 PAUSE_S = (0.01, 0.08)
 BLOCKED_S = 0.2
+LONGEST_S = 60.0
 P99_MS, WORST_MS, LOADED_P99_MS = 10.0, 25.0, 60.0
 TRAJECTORY = "cosmic-trajectory 1\nplatform {}\nleft.x to -400 um\nleft.x to 0 um\n"
 OTHER = """
@@ -90,7 +91,7 @@ class Watch:
         before_s = self._core_s = self._core.now_s()
         self._library.left[CALL] = self._note
         began_s = stop()
-        if not self._all.wait(5.0):
+        if not self._all.wait(LONGEST_S):
             raise RuntimeError(f"only {len(self._reached)} of {self._count} channels were stopped")
         del self._library.left[CALL]
         return Taken(max(self._reached.values()) - began_s, self._core_s - before_s)
@@ -258,12 +259,14 @@ def rows(
 ) -> list[Figure]:
     """Return the rows of one kind of stop."""
     own = [1e3 * each.own_s for each in taken]
+    worst = max(own)
+    print(f"{name}: {len(own)} stops, the slowest {worst:.1f} ms", file=sys.stderr, flush=True)
     core = [1e3 * each.core_s for each in taken]
     whole = [1e3 * each.whole_s for each in taken]
     return [
         Figure(NAME, f"{name}, p50", percentile(own, 50), "ms"),
         Figure(NAME, f"{name}, p99", percentile(own, 99), "ms", p99_ms),
-        Figure(NAME, f"{name}, worst of {len(own)}", max(own), "ms", worst_ms),
+        Figure(NAME, f"{name}, worst of {len(own)}", worst, "ms", worst_ms),
         Figure(NAME, f"{name}, waited for a core, p99", percentile(core, 99), "ms"),
         Figure(NAME, f"{name}, with that, p99", percentile(whole, 99), "ms"),
         Figure(NAME, f"{name}, with that, worst", max(whole), "ms"),

@@ -98,9 +98,15 @@ class PushedCamera(Camera):
                 data.flags.writeable = False
                 now_s = self._clock.now_s()
                 fmt = PixelFormat.MONO8 if data.dtype == np.uint8 else PixelFormat.MONO16
-                self._waiting.append(
-                    DrawnFrame(self._drawing(data), self.given, now_s, now_s, pixel_format=fmt)
+                frame = DrawnFrame(
+                    self._drawing(data),
+                    self.given,
+                    now_s,
+                    now_s,
+                    pixel_format=fmt,
+                    size_px=data.shape[1::-1],
                 )
+                self._waiting.append(frame)
                 self.given += 1
             self._there.notify_all()
 

@@ -116,10 +116,8 @@ class PlatformTransform(CoordinateTransform):
         zoom = self._zoom(image.camera, image.circumstances.zoom_counts)
         if zoom is None:
             raise NotAvailable(f"{image.camera}: the zoom is not known; home the lens")
-        if (
-            settings is None
-            or (settings.roi.height_px, settings.roi.width_px) != (image.data.shape[:2])
-        ):
+        # Asked for each image in the window's thread: it must not wait for the pixels.
+        if settings is None or (settings.roi.width_px, settings.roi.height_px) != image.size_px:
             raise NotAvailable(f"{image.camera}: the image was taken with other settings")
         found = self.calibrations.find(image.camera, zoom, height_um, tool)
         roi = settings.roi
@@ -206,7 +204,7 @@ class PlatformTransform(CoordinateTransform):
             except NotAvailable:
                 continue
             wanted = expected(tool, mapped, tip[:2], positions, REACH_PX)
-            height, width = image.data.shape[:2]
+            width, height = image.size_px
             if wanted is not None and _inside(wanted.tip_px, width, height):
                 found[tool.name] = wanted
         return found

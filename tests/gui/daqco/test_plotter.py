@@ -244,6 +244,10 @@ def test_limits_are_lines_at_their_height(qtbot, plotter, port):
     qtbot.waitUntil(lambda: len(plotter.limit_lines.lines) == 2)
     heights = [line.value() for line in plotter.limit_lines.lines]
     assert heights == pytest.approx([plotter.ranges["uN"].share(v) for v in (-20.0, 60.0)])
+    drawn = list(plotter.limit_lines.lines)
+    port.change(problem="something else has changed")
+    qtbot.waitUntil(lambda: "something else" in plotter.problem.text())
+    assert plotter.limit_lines.lines == drawn, "they were drawn anew for nothing"
     tick(plotter, 0, Qt.CheckState.Unchecked)
     assert plotter.limit_lines.lines == []
 

@@ -1,6 +1,7 @@
 """What happens in any thread reaches a QObject in the GUI thread, while there is one."""
 
 import threading
+from types import MethodType
 
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent
@@ -56,6 +57,45 @@ def test_in_the_gui_thread_it_is_heard_at_once_unless_it_is_queued(qtbot):
     later("later")
     assert len(widget.heard) == 1
     qtbot.waitUntil(lambda: len(widget.heard) == 2)
+
+
+def test_a_window_that_is_slow_looks_once_for_all_that_changed_meanwhile(qtbot, event):
+    widget = Shown()
+    qtbot.addWidget(widget)
+    relay = Relay(widget.hear).follow(event.subscribe)
+    in_a_thread(lambda: [event.emit() for _ in range(500)])
+    qtbot.waitUntil(lambda: bool(widget.heard))
+    QCoreApplication.processEvents()
+    assert len(widget.heard) == 1
+    in_a_thread(event.emit)
+    qtbot.waitUntil(lambda: len(widget.heard) == 2)
+    relay.end()
+
+
+def test_a_change_while_it_looks_makes_it_look_again(qtbot, event):
+    widget = Shown()
+    qtbot.addWidget(widget)
+
+    def look(*_values):
+        widget.heard.append(len(widget.heard))
+        if len(widget.heard) == 1:
+            in_a_thread(event.emit)
+
+    widget.hear = MethodType(lambda _self: look(), widget)
+    relay = Relay(widget.hear).follow(event.subscribe)
+    in_a_thread(event.emit)
+    qtbot.waitUntil(lambda: len(widget.heard) == 2)
+    relay.end()
+
+
+def test_what_has_a_value_is_heard_each_time_and_in_order(qtbot, event):
+    widget = Shown()
+    qtbot.addWidget(widget)
+    relay = Relay(widget.hear).follow(event.subscribe)
+    in_a_thread(lambda: [event.emit(each) for each in range(100)])
+    qtbot.waitUntil(lambda: len(widget.heard) == 100)
+    assert [values[0] for values, _ in widget.heard] == list(range(100))
+    relay.end()
 
 
 def test_it_stops_listening_when_the_widget_goes_and_when_it_is_ended(qapp, event):

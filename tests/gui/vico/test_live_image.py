@@ -56,7 +56,7 @@ def test_the_window_waits_for_no_image_that_is_still_drawn(qtbot, shown, camera)
             assert drawn.is_set(), "the window waited"
             return half(90)
 
-    frame = DrawnFrame(lambda: asked.append(1) or Slow(), 99, 5.0, 5.0)
+    frame = DrawnFrame(lambda: asked.append(1) or Slow(), 99, 5.0, 5.0, size_px=(WIDTH, HEIGHT))
     coming = camera.show_frame(frame)
     qtbot.waitUntil(lambda: bool(asked))
     shown.look()

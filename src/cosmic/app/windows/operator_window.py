@@ -41,6 +41,7 @@ from cosmic.frame.gui.console_panel import ConsolePanel
 from cosmic.frame.gui.late_panel import LatePanel
 from cosmic.frame.gui.log_panel import LogPanel
 from cosmic.frame.gui.palette import ThemeName
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.server_gui import LOG_TITLE, CosmicServerGui
 from cosmic.frame.gui.stop_key import StopKeyFilter
 from cosmic.frame.gui.theme import State
@@ -57,15 +58,10 @@ class WindowBridge(QObject):
     """Emits in the GUI thread what any thread reports; outlives the window, so nothing is lost."""
 
     failure_reported = Signal(object)
-    latch_changed = Signal(object)
 
     def report_failure(self, failure: Failure) -> None:
         """Report a failure."""
         self.failure_reported.emit(failure)
-
-    def report_latch(self, state: StopState) -> None:
-        """Report that the stop was latched or reset."""
-        self.latch_changed.emit(state)
 
 
 CONSOLE: Final = "Console"
@@ -119,6 +115,7 @@ class OperatorWindow(CosmicServerGui):
         self._path: PathController | None = None
         self._parking: Parking | None = None
         self._bridge = WindowBridge()
+        self._stop_shown, self._stops = StopState(reason=None, epoch=0), Relay(self._on_latch)
         self._tasks: TaskLayout | None = None
         self._forget_policy = platform.policy.subscribe(self._bridge.report_failure)
         self._instruments = instruments_of(platform)
@@ -165,7 +162,7 @@ class OperatorWindow(CosmicServerGui):
         self.add_panel(MICO, panel, Qt.DockWidgetArea.LeftDockWidgetArea, scroll=False)
         self._mico_gui = gui
         gui.failure_changed.connect(self._on_mico_failure)
-        gui.mico.follow_stop(self._bridge.report_latch)
+        self._stops.keep(gui.mico.follow_stop(self._note_latch))
         self._scene = ScenePanel(gui, settings)
         if not self._by_task:
             right = Qt.DockWidgetArea.RightDockWidgetArea
@@ -289,7 +286,6 @@ class OperatorWindow(CosmicServerGui):
         self.rescan_requested.connect(self._on_rescan)
         self.closing.connect(self._on_closing)
         self._bridge.failure_reported.connect(self._on_failure)
-        self._bridge.latch_changed.connect(self._on_latch)
 
     def _show_platform(self) -> None:
         bar, platform = self.top_bar, self._platform
@@ -431,14 +427,23 @@ class OperatorWindow(CosmicServerGui):
         if self._mico is not None:
             self._mico.reset_stop()
 
-    def _on_latch(self, state: StopState) -> None:
+    def _note_latch(self, _state: StopState) -> None:
+        self._stops()
+
+    def _on_latch(self) -> None:
+        """Show what is so now: a window that is slow skips what was reset meanwhile."""
+        if self._mico is None or self._mico.stop_state == self._stop_shown:
+            return
+        state = self._mico.stop_state
+        stopped_since = state.epoch != self._stop_shown.epoch
+        self._stop_shown = state
         self.top_bar.set_latched(state.reason)
         if self._mico_gui is not None:
             self._mico_gui.release_keys()
             self._mico_gui.show_stopped(state.reason)
         if self._tasks is not None:
             self._tasks.show_stopped(state.reason)
-        if self._path is not None and state.reason is not None:
+        if self._path is not None and stopped_since:
             self._path.cancel()
 
     def _on_mode_changed(self, mode: str) -> None:

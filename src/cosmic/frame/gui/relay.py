@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Generic, Self, TypeVarTuple
 from weakref import WeakMethod
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QObject, Qt, QThread, Signal
 from shiboken6 import isValid
 
 from cosmic.frame.events import Unsubscribe
@@ -17,6 +17,10 @@ class Relay(QObject, Generic[*Ts]):
 
     It has no parent: whoever calls it keeps it alive, and meets no deleted object. Once the
     QObject is gone, nothing is called any more, and what it follows is unsubscribed.
+
+    A call without arguments says only that there is something to look at: while one has yet to
+    arrive, further ones are one with it. So a window that is slow falls no further behind, and a
+    key for STOP waits behind one look and not behind hundreds.
 
     Parameters
     ----------
@@ -35,6 +39,8 @@ class Relay(QObject, Generic[*Ts]):
             raise TypeError(f"a relay calls a method of a QObject, not {receiver!r}")
         self._receiver = WeakMethod(receiver)
         self._ends: list[Unsubscribe] = []
+        self._queued = queued
+        self._arriving = False
         owner.destroyed.connect(_ender(self._ends))
         kind = Qt.ConnectionType
         self._called.connect(
@@ -43,6 +49,10 @@ class Relay(QObject, Generic[*Ts]):
 
     def __call__(self, *args: *Ts) -> None:
         """Have the receiver called; any thread."""
+        if not args and (self._queued or QThread.currentThread() is not self.thread()):
+            if self._arriving:
+                return
+            self._arriving = True
         self._called.emit(args)
 
     def follow(self, subscribe: Callable[[Callable[[*Ts], object]], Unsubscribe]) -> Self:
@@ -59,6 +69,8 @@ class Relay(QObject, Generic[*Ts]):
         _end_all(self._ends)
 
     def _on_called(self, args: tuple[*Ts]) -> None:
+        if not args:
+            self._arriving = False  # before it looks, so that no change is missed
         receiver = self._receiver()
         if receiver is not None and isValid(getattr(receiver, "__self__", None)):
             receiver(*args)

@@ -56,3 +56,8 @@ class CameraImage:
     def data(self) -> Pixels:
         """The pixels; see `Frame.data`."""
         return self.frame.data
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height, without waiting for the pixels."""
+        return self.frame.size_px

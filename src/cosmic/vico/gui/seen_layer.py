@@ -58,7 +58,7 @@ class SeenLayer(Layer):
     @staticmethod
     def _fits(view: CameraImageView, found: Seen) -> bool:
         """Tell whether it was found in an image of the size shown."""
-        return found.image.data.shape[:2] == view.size_px[::-1]
+        return found.image.size_px == view.size_px
 
     def _paint_fibre(
         self, painter: QPainter, view: CameraImageView, fibre: Fibre, scale: float | None

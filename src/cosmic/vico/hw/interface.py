@@ -243,6 +243,12 @@ class Frame:
     def prepare(self) -> None:
         """Have `data` made ready, without waiting for it."""
 
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height, without waiting for `data`."""
+        height, width = self.data.shape[:2]
+        return width, height
+
 
 class Camera(Protocol):
     """One open camera.

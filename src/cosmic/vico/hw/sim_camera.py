@@ -167,6 +167,8 @@ class DrawnFrame(Frame):
     ----------
     data : callable
         Draws the pixels, read-only, or begins to; is called once.
+    size_px : (int, int)
+        Width and height of what will be drawn.
     """
 
     def __init__(
@@ -178,6 +180,8 @@ class DrawnFrame(Frame):
         device_ns: int | None = None,
         status: FrameStatus = FrameStatus.COMPLETE,
         pixel_format: PixelFormat = PixelFormat.MONO8,
+        *,
+        size_px: tuple[int, int],
     ) -> None:
         values = (frame_id, time_s, exposed_s, device_ns, status, pixel_format)
         names = ("frame_id", "time_s", "exposed_s", "device_ns", "status", "pixel_format")
@@ -185,7 +189,9 @@ class DrawnFrame(Frame):
             object.__setattr__(self, name, value)  # the base is frozen
         object.__setattr__(self, "_source", data)
         object.__setattr__(self, "_drawing", Lock())
+        object.__setattr__(self, "_size_px", size_px)
 
+    _size_px: tuple[int, int]
     _source: Callable[[], Drawing | Pixels] | Drawing | Pixels
     _drawing: Lock
 
@@ -194,6 +200,11 @@ class DrawnFrame(Frame):
     def ready(self) -> bool:
         source = self._source
         return isinstance(source, np.ndarray) or (not callable(source) and source.ready)
+
+    @property
+    @override
+    def size_px(self) -> tuple[int, int]:
+        return self._size_px
 
     @override
     def prepare(self) -> None:
@@ -417,6 +428,7 @@ class SimulatedCamera(BaseCamera):
             device_ns=round(1e9 * (camera.clock_offset_s + exposure.exposed_s * fast)),
             status=FrameStatus.COMPLETE if whole else FrameStatus.INCOMPLETE,
             pixel_format=settings.pixel_format,
+            size_px=(settings.roi.width_px, settings.roi.height_px),
         )
         self._last = before or frame
         return frame

@@ -96,9 +96,14 @@ class LimitLines:
     def __init__(self, chart: Chart) -> None:
         self._chart = chart
         self.lines: list[pg.InfiniteLine] = []
+        self._shown: object = None
 
     def show(self, limits: Sequence[DaqLimit], ranges: dict[str, AxisRange]) -> None:
         """Draw the limits of the channels that are in the image."""
+        wanted = (tuple(limits), dict(ranges), self._chart.traces, current_palette().name)
+        if wanted == self._shown:
+            return  # a line is dear, and this is asked for whenever anything in DAQCo changes
+        self._shown = wanted
         for line in self.lines:
             self._chart.box.removeItem(line)
         self.lines = []
