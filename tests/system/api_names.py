@@ -73,7 +73,7 @@ from cosmic.frame.plan_shape import PlanStatus
 from cosmic.frame.renamed import Renamed
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.axis_group import AxisGroup
-from cosmic.mico.api.axis_shape import AxisMovable
+from cosmic.mico.api.plan_movable import AxisMovable
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.jogging import Jogging

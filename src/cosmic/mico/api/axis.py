@@ -21,13 +21,12 @@ from cosmic.frame.errors import (
 )
 from cosmic.frame.events import notify
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.network.caller import JOG_LIMIT_S, MOVE_LIMIT_S, current_call
+from cosmic.frame.network.caller import JOG_LIMIT_S, MOVE_LIMIT_S
 from cosmic.frame.operation import wait_or_cancel
 from cosmic.frame.threads import may_wait_here
 from cosmic.frame.units import AxisUnit
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
-from cosmic.mico.api.axis_ends import OrderBook, RemoteAxisState
-from cosmic.mico.api.axis_shape import AxisMovable, AxisShape, PlanAxis
+from cosmic.mico.api.axis_orders import AxisOrders
 from cosmic.mico.api.entry import (
     Number,
     as_number,
@@ -36,18 +35,18 @@ from cosmic.mico.api.entry import (
     one_line,
     source_of,
 )
-from cosmic.mico.api.group import GroupMovement, LinkedMovement
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.news import SentMotion
+from cosmic.mico.api.plan_movable import AxisMovable, PlanAxis, PlanMovable
+from cosmic.mico.api.remote_axis_state import RemoteAxisState
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.manager import DeviceManager
-from cosmic.mico.core.motion.messages import Order, PositionChanged
+from cosmic.mico.core.motion.messages import PositionChanged
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import (
     Calibrate,
     Jog,
-    Motion,
     MoveBy,
     MoveTo,
     Reference,
@@ -61,7 +60,7 @@ from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 
 
 @checked_class
-class Axis(AxisShape, Declared):
+class Axis(PlanMovable, Declared):
     """One positioner, as scripts and widgets command it, wherever it is; any thread.
 
     Positions are in `unit` from the user's zero (see `set_zero`). A number may be given as text
@@ -78,7 +77,7 @@ class Axis(AxisShape, Declared):
         self._manager = manager
         self._channel = manager.address(name).channel
         self.commander = commander
-        self._orders = OrderBook()
+        self._orders = AxisOrders(name, manager, commander)
         self._movable = AxisMovable(self)
 
     @override
@@ -412,7 +411,7 @@ class Axis(AxisShape, Declared):
         """
         far = self._far
         if far is None:
-            return self._begin(motion, consent=consent, follows=follows, alone=alone)
+            return self._orders.begin(motion, consent=consent, follows=follows, alone=alone)
         key = secrets.token_hex(8)
         before = "" if follows is None else far.keys.get(follows, "forgotten")
         begun = self.begin(
@@ -448,67 +447,13 @@ class Axis(AxisShape, Declared):
         alone : bool
             As `send`.
         """
-        before = self._orders.movement(follows) if follows else None
-        begun = self._begin(motion, consent=consent, follows=before, alone=alone, source=source)
+        before = self._orders.kept_movement(follows) if follows else None
+        begun = self._orders.begin(
+            motion, consent=consent, follows=before, alone=alone, source=source
+        )
         if key:
             self._orders.keep(key, begun)
         return begun
-
-    def _begin(
-        self,
-        motion: Motion,
-        *,
-        consent: bool,
-        follows: Movement | None = None,
-        alone: bool = False,
-        source: str = "",
-    ) -> Movement:
-        if not alone and isinstance(motion, MoveTo | MoveBy) and self.linked_to:
-            return self._begin_linked(motion, consent=consent, follows=follows, source=source)
-        return self._order(motion, consent=consent, follows=follows, source=source).movement
-
-    def _order(
-        self,
-        motion: Motion,
-        *,
-        consent: bool,
-        follows: Movement | None = None,
-        source: str = "",
-    ) -> Order:
-        if current_call() is None:
-            return self.commander.order(
-                self._channel, motion, consent=consent, follows=follows, source=source
-            )
-        order = Order(
-            self._channel,
-            motion,
-            self._manager.lease.local_token,
-            source_of(source),
-            consent,
-            follows=follows,
-            guard=self._manager.lease.guard(),
-        )
-        self._manager.device(self._name).submit(order)
-        return order
-
-    def _begin_linked(
-        self, motion: Motion, *, consent: bool, follows: Movement | None, source: str
-    ) -> LinkedMovement:
-        """Move this axis and those linked to it; a refusal fails the movement."""
-        whole = LinkedMovement(self._name)
-        before = follows.parts if isinstance(follows, LinkedMovement) else None
-        try:
-            orders = self._manager.order_together(
-                {self._name: motion},
-                source=source_of(source or self._commanded_by),
-                consent=consent,
-                follows=before,
-            )
-        except CosmicError as exc:
-            whole.fail(exc)
-            return whole
-        whole.begin(GroupMovement.of(orders))
-        return whole
 
     @overload
     def move_by(
@@ -638,14 +583,8 @@ class Axis(AxisShape, Declared):
             key, said = secrets.token_hex(8), source or self._commanded_by
             movement = self.begin_jog(motion, key, consent=consent, source=said)
             return Jogging(movement, partial(self.renew, key), self.halt)
-        order = self._order(motion, consent=consent, source=source)
-
-        def renew(velocity: float | None) -> None:
-            if velocity is None:
-                self.commander.renew_jog(order)
-            else:
-                self.commander.steer_on(order, finite(velocity, f"{self._name}: a speed"))
-
+        order = self._orders.give(motion, consent=consent, source=source)
+        renew = partial(self._orders.renew, order)
         return Jogging(order.movement, renew, partial(self.commander.stop, self._channel))
 
     @command(moves=True, limit_s=JOG_LIMIT_S)
@@ -655,21 +594,16 @@ class Axis(AxisShape, Declared):
         """Begin to move continuously, while `renew` comes with the same key."""
         if isinstance(motion, Steer):
             _check_dead_man(self._name, motion.dead_man_s)
-        order = self._order(motion, consent=consent, source=source)
+        order = self._orders.give(motion, consent=consent, source=source)
         self._orders.keep(key, order)
         return order.movement
 
     @command(moves=True, renews=True, limit_s=JOG_LIMIT_S)
     def renew(self, key: str, velocity: float | None = None) -> None:
         """Keep a jog alive; one that is steered at another signed velocity."""
-        order = self._orders.jog(key)
-        if order is None:
-            return
-        device = self._manager.device(self._name)
-        if velocity is None:
-            device.renew_jog(order)
-        else:
-            device.steer_jog(order, finite(velocity, f"{self._name}: a speed"))
+        order = self._orders.kept_jog(key)
+        if order is not None:
+            self._orders.renew(order, velocity)
 
     @overload
     def calibrate(self, *, wait: Literal[True] = True, consent: bool = False) -> float | None: ...
@@ -714,7 +648,7 @@ class Axis(AxisShape, Declared):
     def _sent(self, motion: SentMotion, *, consent: bool) -> Movement:
         """Begin what an axis does alone; the gate refuses it while the axis is linked."""
         if self._far is None:
-            return self._order(motion, consent=consent).movement
+            return self._orders.give(motion, consent=consent).movement
         return self.send(motion, consent=consent)
 
     @command(at_once=True)

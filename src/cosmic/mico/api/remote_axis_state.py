@@ -1,58 +1,17 @@
-"""The two ends of an axis between processes: orders kept where it is, state where it is used."""
+"""What is known here of an axis whose device is at another station."""
 
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from threading import Lock
-from typing import Final
 from weakref import WeakKeyDictionary
 
 from cosmic.frame.declaration import Declared
-from cosmic.frame.errors import MoveCancelled
 from cosmic.frame.events import Event
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
-from cosmic.mico.api.entry import caller_token
-from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import Motion
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import PositionerKind
-
-_KEPT: Final = 512
-
-
-class OrderBook:
-    """The newest orders that other stations gave an axis, by caller and key; any thread."""
-
-    def __init__(self) -> None:
-        self._lock = Lock()
-        self._orders: OrderedDict[tuple[str, str], Order | Movement] = OrderedDict()
-
-    def keep(self, key: str, order: Order | Movement) -> None:
-        """Remember an order under the key that its caller gave it."""
-        with self._lock:
-            self._orders[caller_token(), key] = order
-            while len(self._orders) > _KEPT:
-                self._orders.popitem(last=False)
-
-    def jog(self, key: str) -> Order | None:
-        """Return a jog; None where it was forgotten, or never came."""
-        found = self._orders.get((caller_token(), key))
-        return found if isinstance(found, Order) else None
-
-    def movement(self, key: str) -> Movement:
-        """Return a movement that another one follows.
-
-        Raises
-        ------
-        MoveCancelled
-            It was forgotten long ago: something else came since.
-        """
-        found = self._orders.get((caller_token(), key))
-        if found is None:
-            raise MoveCancelled("a newer command came first")
-        return found.movement if isinstance(found, Order) else found
 
 
 def _unforeseen(_motions: Mapping[str, Motion], _consent: bool) -> MoveVerdict:
@@ -69,7 +28,7 @@ class RemoteAxisState:
     foresee : callable
         Judges motions by what is known here, where nothing may be waited for.
     changed : Event
-        Tells the state of the axis, whatever of it has changed.
+        The state of the axis, whatever of it has changed.
     keys : mapping of Movement
         Under which key the station knows a movement.
     """
@@ -88,7 +47,7 @@ class RemoteAxisState:
         self._newest = (position, std, read_wall_s)
 
     def state(self, axis: Declared, published: PositionerState) -> PositionerState:
-        """Return the state that was told last, with the newest position; absent while away."""
+        """Return the state that was published last, with the newest position; absent while away."""
         newest, away, seen = self._newest, axis.away, self._seen
         if seen is not None and seen[0] is published and seen[1] is newest and seen[2] == away:
             return seen[3]

@@ -1,4 +1,4 @@
-"""The shape that bluesky expects of an axis: what `Axis` and `AxisMovable` share."""
+"""`PlanMovable`: the device that plans of bluesky move, which an axis is under both of its names."""
 
 import math
 from abc import abstractmethod
@@ -73,7 +73,7 @@ class PlanAxis(Protocol):
 
 
 @checked_class
-class AxisShape:
+class PlanMovable:
     """Movable, Readable, Configurable, Locatable, Stoppable and Checkable, without bluesky."""
 
     parent: None = None
@@ -213,7 +213,7 @@ class AxisShape:
 
 
 @checked_class
-class AxisMovable(AxisShape, PlanSignal):
+class AxisMovable(PlanMovable, PlanSignal):
     """An axis for bluesky's RunEngine, whose documents forbid the dot in a name: "left_x".
 
     Plans can monitor it, and suspenders watch its position.
