@@ -39,30 +39,30 @@ def spent_s(call: Callable[[], None]) -> float:
     return time.perf_counter() - before_s
 
 
-def start_two(controller: Controller, way_um: float) -> None:
+def start_two(controller: Controller, distance_um: float) -> None:
     """Send two axes off: as one command group where there is one, else back to back."""
     if controller.capabilities.group_start:
         moves = [
-            MatchedMove(at, way_um, "um", math.inf, 1000.0, 50_000.0, 100.0)
+            MatchedMove(at, distance_um, "um", math.inf, 1000.0, 50_000.0, 100.0)
             for at in (FIRST, SECOND)
         ]
         controller.move_together(moves)
         return
     for at in (FIRST, SECOND):
-        controller.move_to(at, way_um, "um", hold_s=math.inf)
+        controller.move_to(at, distance_um, "um", hold_s=math.inf)
 
 
-def start_all(controller: Controller, channels: int, way_um: float) -> None:
+def start_all(controller: Controller, channels: int, distance_um: float) -> None:
     """Send all axes of a device off: as one command group where there is one."""
     if controller.capabilities.group_start:
         moves = [
-            MatchedMove(Channel(0, number), way_um, "um", math.inf, 1000.0, 50_000.0, 100.0)
+            MatchedMove(Channel(0, number), distance_um, "um", math.inf, 1000.0, 50_000.0, 100.0)
             for number in range(channels)
         ]
         controller.move_together(moves)
         return
     for number in range(channels):
-        controller.move_to(Channel(0, number), way_um, "um", hold_s=math.inf)
+        controller.move_to(Channel(0, number), distance_um, "um", hold_s=math.inf)
 
 
 def stop_all(controller: Controller, channels: int) -> None:

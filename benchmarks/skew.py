@@ -16,7 +16,7 @@ NAME = "skew"
 CALL = "SA_MovePositionAbsolute_A"
 AXES = ("left.x", "left.y", "right.x", "right.y", "probe.x", "probe.y")
 HOLD_MS = 60_000
-WAY_UM = 30.0
+TRAVEL_UM = 30.0
 FRESH_TURN_S = 1e-6
 """A group starts with a fresh turn of the interpreter; preparing bare calls has used it up."""
 
@@ -64,7 +64,7 @@ def collect(bench: Stand, count: int) -> tuple[list[float], list[float], list[fl
     """Return both skews of groups and that of bare calls, made by turns: load hits them alike."""
     seen, by_event, bare = [], [], []
     home_um = {name: bench.mico[name].details.position or 0.0 for name in AXES}
-    away_um = {name: where_um - WAY_UM for name, where_um in home_um.items()}
+    away_um = {name: where_um - TRAVEL_UM for name, where_um in home_um.items()}
     for _ in range(count):
         by_library, by_program = through_the_gate(bench, away_um)
         seen.append(by_library)

@@ -201,7 +201,7 @@ def span_of(push: Push, fibre: Fibre) -> Span:
         nominal_um=push.place_um,
         probe_x_um=push.place_um,
         hold_x_um=0.0,
-        way_um=push.way_um,
+        probe_um=push.way_um,
         force_un=push.force_un,
         force_std_un=push.std_un,
         time_s=push.time_s,

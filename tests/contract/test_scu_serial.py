@@ -63,7 +63,7 @@ def test_an_angle_is_read_from_millidegrees_and_turns(rig, lines):
     assert rig.event(PositionRead, ROTARY).value == pytest.approx(359.8128)
 
 
-def test_one_line_is_under_way_at_a_time_and_commands_come_before_questions(rig, lines):
+def test_one_line_is_unanswered_at_a_time_and_commands_come_before_questions(rig, lines):
     for _ in range(3):
         rig.controller.ask_position(AT, "um")
         rig.controller.ask_activity(AT)

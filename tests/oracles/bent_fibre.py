@@ -84,13 +84,13 @@ class Rig:
             **more,
         )
 
-    def force(self, way_um: np.ndarray, span_um: float) -> np.ndarray:
+    def force(self, probe_um: np.ndarray, span_um: float) -> np.ndarray:
         """Return the force at ways of the probe's axis since the contact, odd in the way."""
         deflections, forces = curve(round(self.radius_um / span_um / 0.005) * 0.005)
         fine = np.linspace(0.0, deflections[-1], 800)
         smooth = _smooth(deflections, forces, fine) * self.ei_n_m2 * UN_UM2 / span_um**2
         way = fine * span_um + smooth / self.sensor_un_um
-        return np.sign(way_um) * np.interp(np.abs(way_um), way, smooth)
+        return np.sign(probe_um) * np.interp(np.abs(probe_um), way, smooth)
 
     def push(self, nominal_um: float, stroke_um: float, steps: int = 24) -> Span:
         """Return what a staircase out and back measures."""
@@ -127,7 +127,7 @@ class Rig:
             nominal_um=nominal_um,
             probe_x_um=self.probe_0_um + self.towards * nominal_um,
             hold_x_um=self.hold_x_um,
-            way_um=way,
+            probe_um=way,
             force_un=read,
             force_std_un=np.full(2 * steps, std),
             time_s=times,

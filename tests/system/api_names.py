@@ -73,12 +73,12 @@ from cosmic.frame.plan_shape import PlanStatus
 from cosmic.frame.renamed import Renamed
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.axis_group import AxisGroup
-from cosmic.mico.api.plan_movable import AxisMovable
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.move_status import MoveStatus
+from cosmic.mico.api.plan_movable import AxisMovable
 from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.api.poses import Poses
 from cosmic.mico.api.stepwise import StepwiseMove

@@ -45,7 +45,7 @@ def pushed(bench: Bench, span_um: float, stroke_um: float, rng: np.random.Genera
         nominal_um=span_um,
         probe_x_um=tips["probe"][0],
         hold_x_um=tips["left.hold"][0],
-        way_um=ways,
+        probe_um=ways,
         force_un=np.array(forces) + NOISE_UN * rng.standard_normal(len(ways)),
         force_std_un=np.full(len(ways), NOISE_UN),
         time_s=np.array(times),

@@ -100,7 +100,7 @@ def test_when_the_holder_is_killed_its_motion_stops(served: Served) -> None:
         assert wait_until(lambda: dead_man.expired, 2.0)
         took_s = WALL.now_s() - killed_s
         assert wait_until(lambda: served.station.lease.state.local)
-        assert took_s < 1.0, "the sign of life goes with the process"
+        assert took_s < 1.0, "the heartbeat goes with the process"
         assert wait_until(lambda: served.listener.clients == [])
 
 

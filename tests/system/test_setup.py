@@ -69,7 +69,7 @@ def test_what_is_found_is_shown_and_nothing_is_written_unasked(
 ) -> None:
     assert main(["setup", "--config", str(folder)]) == 0
     said = capsys.readouterr().out
-    assert "device 0 channel 1: linear, stands at" in said
+    assert "device 0 channel 1: linear, position" in said
     assert "device 3 channel 0: rotary" in said
     assert 'name = "device0.channel1"' in said
     assert (folder / "platform.toml").read_text(encoding="utf-8") == PLATFORM

@@ -526,7 +526,7 @@ def test_a_path_to_the_start_is_found_around_what_is_in_between(rig: Rig) -> Non
     trajectory = mico.trajectories.parse(
         "cosmic-trajectory 1\nplatform FiberStation\nstart left.z 300 um\nleft.z by 50 um\n"
     )
-    mico.trajectories.run(trajectory, start="way")
+    mico.trajectories.run(trajectory, start="detour")
     assert where(mico, "left.z") == pytest.approx([350.0], abs=1.0)
 
 
@@ -547,7 +547,7 @@ def test_poses_are_taught_and_gone_to(rig: Rig) -> None:
     mico.poses.go("here")
     assert where(mico, "left.y") == pytest.approx([pose.positions["left.y"]], abs=1.0)
     mico["left.y"].move_by(150.0)
-    mico.poses.go("here", way=True)
+    mico.poses.go("here", detour=True)
     assert where(mico, "left.y") == pytest.approx([pose.positions["left.y"]], abs=1.0)
     assert mico.poses.path is None  # the shipped configuration is nobody's to change
     mico.poses.remove("here")

@@ -30,6 +30,7 @@ from cosmic.autonomy.bending.plan import DRY_EI_N_M2, SpanLimits, guess_ei, plan
 from cosmic.autonomy.bending.result import BendingError, BendingResult, Floats
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.campaign.storage_format import COLUMNS
 from cosmic.frame.errors import CosmicError
 
 WORLDS: Final = ("friendly", "realistic", "harsh")
@@ -233,10 +234,7 @@ def _span(read: dict[str, Any], line: Floats, place_um: float) -> Span:
         hold_x_um=0.0,
         loading=np.array(read["loading"], dtype=np.bool_),
         shape=NaturalShape(line[:, 0], line[:, 1], place_um),
-        **{
-            name: np.array(read[name], dtype=np.float64)
-            for name in ("way_um", "force_un", "force_std_un", "time_s")
-        },
+        **{name: np.array(read[key], dtype=np.float64) for key, name in COLUMNS.items()},
     )
 
 

@@ -117,12 +117,12 @@ class TestAppDAQCoConverter:
         """
         share, force_un = self.share, abs(self._force_un)
         with self._lock:
-            under_way, settled = self._under_way(velocities)
+            moving, settled = self._moving(velocities)
             if share >= 1.0:
-                self._blamed, self._blamed_at_un = under_way or self._blamed, force_un
+                self._blamed, self._blamed_at_un = moving or self._blamed, force_un
                 return dict(velocities)
             if not self._blamed:
-                self._blamed, self._blamed_at_un = under_way, force_un
+                self._blamed, self._blamed_at_un = moving, force_un
             elif force_un > self._blamed_at_un + RISE_UN:
                 self._blamed.update(settled)
                 self._blamed_at_un = force_un
@@ -132,7 +132,7 @@ class TestAppDAQCoConverter:
             for name, velocity in velocities.items()
         }
 
-    def _under_way(self, velocities: Mapping[str, float]) -> tuple[dict[str, int], dict[str, int]]:
+    def _moving(self, velocities: Mapping[str, float]) -> tuple[dict[str, int], dict[str, int]]:
         """Return the directions under way, and those of them that are for some time."""
         now_s = WALL.now_s()
         before = self._since
@@ -142,13 +142,13 @@ class TestAppDAQCoConverter:
                 direction = 1 if velocity > 0.0 else -1
                 same = name in before and before[name][0] == direction
                 self._since[name] = before[name] if same else (direction, now_s)
-        under_way = {name: direction for name, (direction, _) in self._since.items()}
+        moving = {name: direction for name, (direction, _) in self._since.items()}
         settled = {
             name: direction
             for name, (direction, since_s) in self._since.items()
             if now_s - since_s >= LAG_S
         }
-        return under_way, settled
+        return moving, settled
 
 
 class TestAppMiCoConverter(Converter):

@@ -149,9 +149,9 @@ def _best(angles: list[float], lines: list[Floats]) -> RotationFit:
     fits: list[RotationFit] = []
     refusals: list[CalibrationRefused] = []
     for index in range(3):
-        way = [(float(each[index][0]), float(each[index][1])) for each in lines]
+        points = [(float(each[index][0]), float(each[index][1])) for each in lines]
         try:
-            fits.append(fit_rotation(angles, way))
+            fits.append(fit_rotation(angles, points))
         except CalibrationRefused as exc:
             refusals.append(exc)
     if not fits:

@@ -1,10 +1,16 @@
-"""An attribute under the name it had before: it still works for one version, with a warning."""
+"""Names that were used before: they still work for one version, with a warning."""
 
+import inspect
 import sys
 import warnings
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from functools import wraps
+from typing import Any, Final, ParamSpec, TypeVar
 
+P = ParamSpec("P")
+T = TypeVar("T")
+
+_FRAME: Final = "cosmic.frame."
 SKIP_OWN: Final = 2
 """Levels of the stack up to whoever used the old name."""
 
@@ -59,3 +65,61 @@ def renamed_in(module: str, names: Mapping[str, str]) -> Callable[[str], Any]:
         return getattr(sys.modules[module], names[name])
 
     return look_up
+
+
+def _levels_up() -> int:
+    """Return how far up the stack the caller stands, past what checks arguments."""
+    frame, levels = inspect.currentframe(), 0
+    while frame is not None and frame.f_globals.get("__name__", "").startswith(_FRAME):
+        frame, levels = frame.f_back, levels + 1
+    return levels
+
+
+def renamed_parameters(**names: str) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Return a decorator for a function some of whose parameters have a new name.
+
+    Parameters
+    ----------
+    **names : str
+        The new name by the old one: ``@renamed_parameters(way="path")``.
+    """
+
+    def decorate(function: Callable[P, T]) -> Callable[P, T]:
+        @wraps(function)
+        def call(*args: P.args, **kwargs: P.kwargs) -> T:
+            for old in names.keys() & kwargs.keys():
+                new = names[old]
+                if new in kwargs:
+                    raise TypeError(f"{function.__qualname__}() got both {old!r} and {new!r}")
+                warnings.warn(
+                    f"{function.__qualname__}({old}=...) is now called {new}; "
+                    "the old name goes with the next version",
+                    DeprecationWarning,
+                    stacklevel=_levels_up(),
+                )
+                kwargs[new] = kwargs.pop(old)
+            return function(*args, **kwargs)
+
+        return call
+
+    return decorate
+
+
+def renamed_fields(**names: str) -> Callable[[type[T]], type[T]]:
+    """Return a decorator for a dataclass some of whose fields have a new name.
+
+    Parameters
+    ----------
+    **names : str
+        The new name by the old one; both are read, and given where an object is made.
+    """
+
+    def decorate(kind: type[T]) -> type[T]:
+        for old, new in names.items():
+            renamed = Renamed(new)
+            renamed.__set_name__(kind, old)
+            setattr(kind, old, renamed)
+        setattr(kind, "__init__", renamed_parameters(**names)(vars(kind)["__init__"]))  # noqa: B010 - mypy
+        return kind
+
+    return decorate

@@ -64,15 +64,15 @@ class Contacts:
         self._high = np.array([each.max(axis=0) for each in self._corners])
         self._stages = sorted({name for slide in self._slides for name, _ in slide.directions})
         self._origins = np.array([slide.origin for slide in self._slides])
-        self._ways = np.array([self._way(slide) for slide in self._slides])
-        self._steepest = float(np.abs(self._ways).max(initial=0.0))
+        self._travels = np.array([self._travel_of(slide) for slide in self._slides])
+        self._steepest = float(np.abs(self._travels).max(initial=0.0))
         self._moving = [n for n, slide in enumerate(self._slides) if slide.directions]
         self._of_tool: dict[str, list[int]] = {}
         for number in self._moving:
             self._of_tool.setdefault(self._links[number].partition("_")[0], []).append(number)
         travels = [settings.kinds[settings.stages[name].kind] for name in self._stages]
         ends = np.array([[kind.low, kind.high] for kind in travels])
-        swept = self._ways[:, :, :, None] * ends[None, None, :, :]
+        swept = self._travels[:, :, :, None] * ends[None, None, :, :]
         self._lowest = self._origins + self._low + swept.min(axis=3).sum(axis=2)
         self._highest = self._origins + self._high + swept.max(axis=3).sum(axis=2)
         self._first, self._second = self._pairs()
@@ -100,7 +100,7 @@ class Contacts:
             self._slack_um > near or (self._by_design is not None and time_s < self._next_s)
         ):
             return max(self._slack_um - near, FINEST_UM)
-        positions = self._origins + self._ways @ [values[name] for name in self._stages]
+        positions = self._origins + self._travels @ [values[name] for name in self._stages]
         if not offsets.still:
             for tool, numbers in self._of_tool.items():
                 positions[numbers] += offsets.at(tool, time_s)
@@ -191,7 +191,7 @@ class Contacts:
         low, high = self._lowest, self._highest
         return bool((low[one] < high[two]).all() and (low[two] < high[one]).all())
 
-    def _way(self, slide: Slide) -> Floats:
+    def _travel_of(self, slide: Slide) -> Floats:
         """Return how a body goes with each stage, shape (3, stages)."""
         direction = np.zeros((3, len(self._stages)))
         for name, each in slide.directions:

@@ -38,7 +38,7 @@ class Clinging:
         self._handling = handling
         self._chance = random.Random(f"free {key}")
         self._turns = list(position)
-        self._ways = [0, 0, 0]
+        self._headings = [0, 0, 0]
         self._last = position
         self._wiped_um = 0.0
 
@@ -52,11 +52,11 @@ class Clinging:
         """
         if self._shaken(position):
             return "shaken"
-        way = math.dist(position[:2], self._last[:2])
+        travelled = math.dist(position[:2], self._last[:2])
         self._last = position
         if position[2] >= low_um:
             return ""
-        self._wiped_um += way
+        self._wiped_um += travelled
         if self._wiped_um < self._handling.wipe_um:
             return ""
         self._wiped_um = 0.0
@@ -65,14 +65,14 @@ class Clinging:
     def _shaken(self, position: Point) -> bool:
         for axis, now in enumerate(position):
             since = now - self._turns[axis]
-            way = self._ways[axis]
-            if way == 0:
+            heading = self._headings[axis]
+            if heading == 0:
                 if abs(since) >= self._handling.shake_um:
-                    self._ways[axis], self._turns[axis] = (1 if since > 0.0 else -1), now
-            elif since * way > 0.0:
+                    self._headings[axis], self._turns[axis] = (1 if since > 0.0 else -1), now
+            elif since * heading > 0.0:
                 self._turns[axis] = now
             elif abs(since) >= self._handling.shake_um:
-                self._ways[axis], self._turns[axis] = -way, now
+                self._headings[axis], self._turns[axis] = -heading, now
                 if self._chance.random() < self._handling.shake_frees:
                     return True
         return False
@@ -290,10 +290,10 @@ class GripperContacts:
         if fate.slip_at_um < math.inf and fibre.height_um(tool) > fate.slip_at_um:
             self._lose(fibre, tool, around, "slipped")
         elif fate.drop_after_um < math.inf and not fibre.on_plate:
-            position, way = self._came_um[fibre.number]
-            way += math.dist(position, tool.hold)
-            self._came_um[fibre.number] = tool.hold, way
-            if way > fate.drop_after_um:
+            position, travelled = self._came_um[fibre.number]
+            travelled += math.dist(position, tool.hold)
+            self._came_um[fibre.number] = tool.hold, travelled
+            if travelled > fate.drop_after_um:
                 self._lose(fibre, tool, around, "dropped")
 
     def loosen(self, fibre: Fibre) -> None:

@@ -61,8 +61,8 @@ class ToolOffsets:
         """How fast a tool drifts at most; None while a tip is bent."""
         if self._bent:
             return None
-        ways = self._drift.values()
-        return max((math.hypot(*way) * rate for way, rate, _ in ways), default=0.0)
+        drifts = self._drift.values()
+        return max((math.hypot(*drift) * rate for drift, rate, _ in drifts), default=0.0)
 
     def bend(self, tool: str, offset_um: Point) -> None:
         """Have the tip of a tool bent by so much; zeros end it."""

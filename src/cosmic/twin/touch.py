@@ -32,12 +32,12 @@ class Touch:
         travel_um : float
             How far the probe's tip is past the body's face; negative: in front of it.
         """
-        before, way_before = self._reach, self._travel
+        before, travel_before = self._reach, self._travel
         self._reach, self._travel = reach_um, travel_um
         if reach_um <= 0.0:
             self.pressed = False
         elif not self.pressed and travel_um > 0.0:
-            self.pressed = before is not None and self._came_from_front(before, way_before)
+            self.pressed = before is not None and self._came_from_front(before, travel_before)
         return self.pressed
 
     def lose(self) -> None:
@@ -49,12 +49,12 @@ class Touch:
         self.pressed = False
         self._travel = min(self._travel, 0.0)
 
-    def _came_from_front(self, before: float, way_before: float) -> bool:
-        if way_before > 0.0 or self._reach is None:
+    def _came_from_front(self, before: float, travel_before: float) -> bool:
+        if travel_before > 0.0 or self._reach is None:
             return False
         if before >= 0.0:
             return True
         # Both crossed between two looks: which first?
         into_reach = -before / (self._reach - before)
-        past_face = -way_before / (self._travel - way_before)
+        past_face = -travel_before / (self._travel - travel_before)
         return into_reach <= past_face

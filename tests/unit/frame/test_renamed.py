@@ -2,7 +2,8 @@ import sys
 
 import pytest
 
-from cosmic.frame.renamed import Renamed, renamed_in
+from cosmic.frame.arguments import checked
+from cosmic.frame.renamed import Renamed, renamed_in, renamed_parameters
 
 
 class Stage:
@@ -46,3 +47,23 @@ def test_an_old_name_of_a_module_works_and_warns() -> None:
 def test_a_name_that_a_module_never_had_is_an_error() -> None:
     with pytest.raises(AttributeError, match="no attribute 'other'"):
         renamed_in(__name__, {})("other")
+
+
+@checked
+@renamed_parameters(way="path")
+def follow(path: str, *, speed: float = 1.0) -> str:
+    return f"{path} at {speed:g}"
+
+
+def test_an_old_name_of_a_parameter_works_and_warns_where_it_was_used() -> None:
+    with pytest.warns(
+        DeprecationWarning, match=r"follow\(way=\.\.\.\) is now called path"
+    ) as heard:
+        assert follow(way="home", speed=2.0) == "home at 2"  # type: ignore[call-arg]
+    assert heard[0].filename == __file__
+    assert follow("home") == follow(path="home") == "home at 1"
+
+
+def test_both_names_of_a_parameter_are_an_error() -> None:
+    with pytest.raises(TypeError, match="got both 'way' and 'path'"):
+        follow(path="home", way="away")  # type: ignore[call-arg]

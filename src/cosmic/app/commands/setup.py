@@ -124,7 +124,7 @@ def _looked_at(path: Path, found: Sequence[FoundAxis], *, move: bool) -> Iterato
                 position = axis.position_um if each.unit == "um" else axis.angle_deg
                 here = replace(each, position=position or 0.0)
                 sys.stdout.write(
-                    f"device {here.device} channel {here.channel}: {here.kind}, stands at "
+                    f"device {here.device} channel {here.channel}: {here.kind}, position "
                     f"{here.position:.1f} {here.unit}\n"
                 )
                 if move:
@@ -134,16 +134,17 @@ def _looked_at(path: Path, found: Sequence[FoundAxis], *, move: bool) -> Iterato
 
 def _nudge(rig: Rig, axis: FoundAxis) -> None:
     """Move an axis there and back, where the operator agrees."""
-    way = NUDGE[axis.unit]
+    shift = NUDGE[axis.unit]
     sys.stdout.write(
-        f"  Move it by {way:g} {axis.unit} there and back? Nothing checks what it may touch. [y/N] "
+        f"  Move it by {shift:g} {axis.unit} there and back? "
+        "Nothing checks what it may touch. [y/N] "
     )
     sys.stdout.flush()
     if sys.stdin.readline().strip().lower() not in ("y", "yes"):
         return
     try:
-        rig.mico[axis.name].move_by(way, consent=True)
-        rig.mico[axis.name].move_by(-way, consent=True)
+        rig.mico[axis.name].move_by(shift, consent=True)
+        rig.mico[axis.name].move_by(-shift, consent=True)
     except CosmicError as exc:
         sys.stdout.write(f"  {exc}\n")
     else:

@@ -91,7 +91,7 @@ class GatewaySession:
 
     @property
     def may_be_silent(self) -> bool:
-        """It asked to keep the right to move longer than signs of life are apart."""
+        """It asked to keep the right to move longer than heartbeats are apart."""
         return self._keep_s > MOVE_LIMIT_S
 
     def take_control(self, *, in_process: bool = False, keep_s: float = MOVE_LIMIT_S) -> None:
@@ -124,7 +124,7 @@ class GatewaySession:
         self._station.lease.release(self._caller.token)
 
     def beat(self) -> None:
-        """Note a sign of life of the program."""
+        """Note a heartbeat of the program."""
         self._station.lease.beat(self._caller.token, self._station.clock.now_s())
 
     def lose_motion(self, why: str) -> None:

@@ -121,7 +121,7 @@ class ImageBar(QWidget):
         self.show_move("nothing is calibrated yet", "")
         self.fit = _button("Fit", "Show the whole image")
         self.fit.clicked.connect(self.fit_requested)
-        self.inset = named(_button("▣", "Show the other picture as inset"), "barInset")
+        self.inset = named(_button("▣", "Show the other image as inset"), "barInset")
         self.inset.setCheckable(True)
         self.inset.setChecked(True)
         self.inset.toggled.connect(self.inset_toggled)

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.autonomy.procedures.run import OVER, ProcedureRun, RunState
-from cosmic.autonomy.procedures.tree import ENDS, OPERATION, UNDER_WAY, NodeView
+from cosmic.autonomy.procedures.tree import ENDS, OPERATION, RUNNING_STATES, NodeView
 from cosmic.daqco.gui.value_field import ValueField
 from cosmic.frame.gui.build import named, push_button, styled, tight_row
 from cosmic.frame.gui.elided_label import ElidedLabel
@@ -41,7 +41,7 @@ def at_work(view: NodeView) -> str:
     """Return the operation that is carried out now; empty for none."""
     running = (each.name for each in view.walk() if each.kind == OPERATION)
     states = {each.name: each.state for each in view.walk() if each.kind == OPERATION}
-    return next((name for name in running if states[name] in UNDER_WAY), "")
+    return next((name for name in running if states[name] in RUNNING_STATES), "")
 
 
 class OperationCard(QFrame):

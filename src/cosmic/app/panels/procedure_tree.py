@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.app.panels.state_indicator import INDICATOR_PX, state_pixmap
-from cosmic.autonomy.procedures.tree import UNDER_WAY, NodeEvent, NodeState, NodeView, Path
+from cosmic.autonomy.procedures.tree import RUNNING_STATES, NodeEvent, NodeState, NodeView, Path
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.theme import State, current_palette, number_font, ui_font
 from cosmic.frame.overrides import override
@@ -120,7 +120,7 @@ class ProcedureTree(QTreeWidget):
             if self._shown.get(path) != shown:
                 self._shown[path] = shown
                 self._write(self._items[path], each, time)
-            if each.state in UNDER_WAY:
+            if each.state in RUNNING_STATES:
                 front = path  # the last one stands lowest: the operation, not what is above it
         if front != self._front:
             self._front = front
@@ -135,7 +135,7 @@ class ProcedureTree(QTreeWidget):
         item.setText(TIME, time)
         item.setText(CAUSE, event.cause or event.text)
         item.setToolTip(CAUSE, f"{event.cause}: {event.text}" if event.cause else event.text)
-        running = view.state in UNDER_WAY
+        running = view.state in RUNNING_STATES
         quiet = view.state is NodeState.WAITING
         colour = QBrush(QColor(palette.dim if quiet else palette.text))
         for column in range(len(_TITLES)):

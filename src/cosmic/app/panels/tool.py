@@ -204,14 +204,14 @@ class ToolPanel(QWidget):
         self.go_pose.clicked.connect(self._on_go_pose)
         self.keep.clicked.connect(self._on_keep)
         self.pose_name.returnPressed.connect(self._on_pose_named)
-        self._make_ways_out()
+        self._make_exits()
         self.line = named(QLabel(), "toolLine")
         self.line.setWordWrap(True)
         self.line.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.line.setMinimumHeight(4 * STEP_PX)
         self.line.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
 
-    def _make_ways_out(self) -> None:
+    def _make_exits(self) -> None:
         """Make what a refusal leaves to be done, each by one button."""
         self.nearest = named(push_button("", "Go as far as the gate allows"), "toolNearest")
         self.detour = named(
@@ -249,10 +249,10 @@ class ToolPanel(QWidget):
         self._column.setSpacing(STEP_PX // 2)
         self._column.addLayout(choices)
         self._column.addWidget(self._body)
-        ways, row = tight_row(STEP_PX // 2)
+        exits, row = tight_row(STEP_PX // 2)
         row.addWidget(self.nearest, 1)
         row.addWidget(self.detour, 1)
-        for widget in (step, last, poses, self.pose_name, ways, self.line):
+        for widget in (step, last, poses, self.pose_name, exits, self.line):
             self._column.addWidget(widget)
         self._column.addStretch(1)
 
@@ -605,9 +605,9 @@ class ToolPanel(QWidget):
             return
         name, again = self._last
         commands = self._gui.cards[name].commands
-        before, commands.seeks_ways = commands.seeks_ways, True
+        before, commands.plans_detours = commands.plans_detours, True
         again()
-        commands.seeks_ways = before
+        commands.plans_detours = before
 
     def _on_said(self, text: str, state: object) -> None:
         glyph = state_look(state).glyph if isinstance(state, State) else ""

@@ -105,9 +105,9 @@ class AlarmWatch:
         by_value = self._by_value(quantity, value)
         by_rate = self._by_rate(quantity.levels, rate)
         speed = abs(rate * quantity.scale)
-        ways = "falls" if quantity.falling else "rises"
+        trend = "falls" if quantity.falling else "rises"
         if by_rate is not None and (by_value is None or by_rate is Level.CRITICAL):
-            text = f"{quantity.name} {ways} by {speed:.3g}{unit} per second"
+            text = f"{quantity.name} {trend} by {speed:.3g}{unit} per second"
             self._raise(quantity, by_rate, text)
         else:
             self._raise(quantity, by_value, f"{quantity.name} is {shown:.3g}{unit}")

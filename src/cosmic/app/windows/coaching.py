@@ -155,7 +155,7 @@ class _Rules:
         if operations is None or spaces is None or spaces.current not in ("Handle", "Measure"):
             return None
         if operations.running:
-            return Step("The operation runs; its card is on the picture. Escape or STOP stops it.")
+            return Step("The operation runs; its card is on the image. Escape or STOP stops it.")
         request = operations.next_request()
         if request is not None:
             holder = operations.handling.held_by

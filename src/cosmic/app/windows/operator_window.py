@@ -449,7 +449,7 @@ class OperatorWindow(CosmicServerGui):
     def _on_mode_changed(self, mode: str) -> None:
         if self._mico_gui is None or self._path is None:
             return
-        self._mico_gui.set_seeking_ways(mode == ECM)
+        self._mico_gui.set_planning_detours(mode == ECM)
         panel = {SCM: TRAJECTORIES, ACM: CAMPAIGN}.get(mode)
         if panel is not None:
             self.raise_panel(panel)

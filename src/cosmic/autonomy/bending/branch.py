@@ -29,7 +29,7 @@ class Points:
         Which points of the span these are.
     """
 
-    way_um: Floats
+    probe_um: Floats
     force_un: Floats
     std_un: Floats
     time_s: Floats
@@ -42,7 +42,7 @@ class Points:
         kept[np.flatnonzero(self.kept)[mask]] = False
         stay = ~mask
         return Points(
-            self.way_um[stay],
+            self.probe_um[stay],
             self.force_un[stay],
             self.std_un[stay],
             self.time_s[stay],
@@ -67,7 +67,7 @@ def points_of(span: Span) -> Points:
     BendingError
         The arrays differ in length, or too few points are left.
     """
-    count = len(span.way_um)
+    count = len(span.probe_um)
     columns = (span.force_un, span.force_std_un, span.time_s, span.loading)
     if any(len(each) != count for each in columns):
         raise BendingError(
@@ -75,7 +75,7 @@ def points_of(span: Span) -> Points:
             f"{', '.join(str(len(each)) for each in columns)} forces, deviations, times and "
             "directions: each point needs all of them"
         )
-    kept = np.isfinite(span.way_um) & np.isfinite(span.force_un) & np.isfinite(span.time_s)
+    kept = np.isfinite(span.probe_um) & np.isfinite(span.force_un) & np.isfinite(span.time_s)
     kept &= np.isfinite(span.force_std_un) & (span.force_std_un > 0.0)
     if kept.sum() < LEAST_POINTS:
         raise BendingError(
@@ -88,7 +88,7 @@ def points_of(span: Span) -> Points:
             f"way out, and a fit needs {LEAST_OUT}: measure it again with more steps"
         )
     return Points(
-        span.way_um[kept],
+        span.probe_um[kept],
         span.force_un[kept],
         span.force_std_un[kept],
         span.time_s[kept],
@@ -102,10 +102,10 @@ def free_force_un(points: Points) -> Floats:
     ends = []
     for branch in (points.loading, ~points.loading):
         if branch.any():
-            ways, forces, times = (
-                values[branch] for values in (points.way_um, points.force_un, points.time_s)
+            probes, forces, times = (
+                values[branch] for values in (points.probe_um, points.force_un, points.time_s)
             )
-            free = np.argsort(ways, kind="stable")[: max(2, round(FREE_PART * len(ways)))]
+            free = np.argsort(probes, kind="stable")[: max(2, round(FREE_PART * len(probes)))]
             ends.append((float(np.mean(times[free])), float(np.median(forces[free]))))
     times_s, levels = zip(*sorted(ends), strict=True)
     return np.asarray(np.interp(points.time_s, times_s, levels), dtype=np.float64)
@@ -117,26 +117,26 @@ def stuck(points: Points, drift_un_sqrt_s: float) -> Mask:
     From the last contact down to where it lets go: the points between are no part of the
     baseline, even where the pull is too small to be seen.
     """
-    out, nothing = points.loading, np.zeros(len(points.way_um), dtype=np.bool_)
+    out, nothing = points.loading, np.zeros(len(points.probe_um), dtype=np.bool_)
     if out.sum() < LEAST_POINTS or out.all():
         return nothing
-    free = out & (points.way_um <= np.quantile(points.way_um[out], FREE_PART))
+    free = out & (points.probe_um <= np.quantile(points.probe_um[out], FREE_PART))
     level = float(np.mean(points.force_un[free]))
     waited_s = np.maximum(points.time_s - float(np.mean(points.time_s[free])), 0.0)
     noise = np.sqrt(points.std_un**2 + drift_un_sqrt_s**2 * waited_s)
     pulls = ~out & (points.force_un - level < -CLEAR_SIGMAS * noise)
     if not pulls.any():
         return nothing
-    hinge = rough(points, out, np.full(len(points.way_um), level)).hinge_um
-    lowest = float(np.min(points.way_um[pulls]))
-    between = (points.way_um >= lowest) & (points.way_um <= hinge)
+    hinge = rough(points, out, np.full(len(points.probe_um), level)).hinge_um
+    lowest = float(np.min(points.probe_um[pulls]))
+    between = (points.probe_um >= lowest) & (points.probe_um <= hinge)
     return np.asarray(~out & (pulls | between), dtype=np.bool_)
 
 
 def rough(points: Points, branch: Mask, baseline_un: Floats) -> Rough:
     """Return where a branch has its kink, trying each position."""
-    order = np.argsort(points.way_um[branch], kind="stable")
-    travel = points.way_um[branch][order]
+    order = np.argsort(points.probe_um[branch], kind="stable")
+    travel = points.probe_um[branch][order]
     force = (points.force_un - baseline_un)[branch][order]
     positions = np.unique(np.concatenate([travel, (travel[1:] + travel[:-1]) / 2.0]))[:-1]
     ramp = np.maximum(travel - positions[:, None], 0.0)
@@ -151,7 +151,7 @@ def through_highest(points: Points, branch: Mask, baseline_un: Floats, k_un_um: 
     """Return the branch of a known stiffness that goes through the highest force."""
     height = (points.force_un - baseline_un)[branch]
     highest = int(np.argmax(height))
-    return Rough(float(points.way_um[branch][highest] - height[highest] / k_un_um), k_un_um)
+    return Rough(float(points.probe_um[branch][highest] - height[highest] / k_un_um), k_un_um)
 
 
 NEAR_RANGE: Final = 0.98
@@ -166,7 +166,7 @@ COMPARED_FROM: Final = 0.2
 def touched(points: Points, drift_un_sqrt_s: float) -> bool:
     """Return whether neighbouring points rise clearly above the baseline on the way out."""
     out = points.loading if points.loading.sum() >= NEIGHBOURS else np.ones_like(points.loading)
-    order = np.argsort(points.way_um[out], kind="stable")
+    order = np.argsort(points.probe_um[out], kind="stable")
     height = (points.force_un - free_force_un(points))[out][order]
     mean = np.convolve(height, np.full(NEIGHBOURS, 1.0 / NEIGHBOURS), mode="valid")
     took_s = float(np.ptp(points.time_s[out]))
@@ -192,7 +192,7 @@ def lost_while_pushing(points: Points) -> bool:
     """Return whether the force fell while the probe went on: fibre broken, or passed by."""
     out = points.loading
     height = (points.force_un - free_force_un(points))[out]
-    travel, std = points.way_um[out], points.std_un[out]
+    travel, std = points.probe_um[out], points.std_un[out]
     if len(travel) < 3:
         return False
     order = np.argsort(travel, kind="stable")
@@ -207,11 +207,11 @@ def back_and_forth_percent(points: Points, baseline_un: Floats) -> float:
     out, back = points.loading, ~points.loading
     if out.sum() < 3 or back.sum() < 3:
         return math.nan
-    order = np.argsort(points.way_um[back], kind="stable")
-    travel, force = points.way_um[back][order], height[back][order]
+    order = np.argsort(points.probe_um[back], kind="stable")
+    travel, force = points.probe_um[back][order], height[back][order]
     peak = float(np.max(height[out]))
-    high = (height[out] > COMPARED_FROM * peak) & (points.way_um[out] <= travel[-1])
+    high = (height[out] > COMPARED_FROM * peak) & (points.probe_um[out] <= travel[-1])
     if not high.any():
         return math.nan
-    there = np.interp(points.way_um[out][high], travel, force)
+    there = np.interp(points.probe_um[out][high], travel, force)
     return 100.0 * float(np.mean(height[out][high] - there)) / peak

@@ -63,20 +63,20 @@ class PushedCurve:
     pushed: Floats
 
     def force_un(
-        self, way_um: Floats, *, k_un_um: float, lever_um: float, sensor_un_um: float
+        self, probe_um: Floats, *, k_un_um: float, lever_um: float, sensor_un_um: float
     ) -> Floats:
         """Return the force in front of a sensor that gives way; 0 before the contact.
 
         Parameters
         ----------
-        way_um : ndarray
+        probe_um : ndarray
             Of the probe's axis since the first contact.
         k_un_um : float
             Stiffness of the fibre at the first contact, 3 EI/lever^3.
         """
         force = k_un_um * lever_um * self.pushed
-        way = lever_um * self.deflection + force / sensor_un_um
-        return np.asarray(np.interp(way_um, way, force), dtype=np.float64)
+        travel = lever_um * self.deflection + force / sensor_un_um
+        return np.asarray(np.interp(probe_um, travel, force), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,11 +203,11 @@ class NaturalShape:
         wandered = (ends - radius_um * contact).reshape(2, LOADS).mean(axis=0)
         inwards = wandered < wandered[0]
         good = (np.abs(off) < 1e-3 * lever).reshape(2, LOADS)
-        ways = []
+        both = []
         for first in (0, 1):
             chosen = np.where(inwards, 1 - first, first) * LOADS + np.arange(LOADS)
-            ways.append(self._pushed(y[chosen], across[chosen], good.ravel()[chosen], lever=lever))
-        return ways[0], ways[1]
+            both.append(self._pushed(y[chosen], across[chosen], good.ravel()[chosen], lever=lever))
+        return both[0], both[1]
 
     def _pushed(self, y: Floats, across: Floats, good: Mask, *, lever: float) -> PushedCurve:
         deflection = y[0] - y

@@ -170,7 +170,7 @@ def readings_of(
     if certified is not None:
         own = (*own[2:], ("friction", "", friction, 0.0, settings.friction_std))
     return Readings(
-        log_k=np.log(k) - _between_ways(span, np.log(k)),
+        log_k=np.log(k) - _between_branches(span, np.log(k)),
         noise=_noise(fits, rows, settings),
         span=span,
         to_common=to_common,
@@ -212,7 +212,7 @@ def _askew(sign: Floats, same: np.ndarray, settings: FitSettings) -> Floats:
     return np.asarray(each * np.outer(sign, sign))
 
 
-def _between_ways(span: np.ndarray, log_k: Floats) -> Floats:
+def _between_branches(span: np.ndarray, log_k: Floats) -> Floats:
     """Return how far the mean ln(k) of both ways of a span lies above that of its mean compliance.
 
     Friction that holds a section that stands askew takes as much compliance away on the way out
@@ -255,7 +255,7 @@ def _noise(fits: Sequence[SpanFit], rows: Sequence[_Row], settings: FitSettings)
     noise = np.diag(stds**2)
     for i, row in enumerate(rows):
         if row.sign < 0.0:  # the way out stands before it
-            both = fits[row.span].ways_correlation * stds[i] * stds[i - 1]
+            both = fits[row.span].branches_correlation * stds[i] * stds[i - 1]
             noise[i, i - 1] = noise[i - 1, i] = both
     return noise
 

@@ -138,8 +138,8 @@ def _rough_ei(span: Span, settings: FitSettings) -> float | None:
     rising = np.arange(len(force)) <= int(np.argmax(force))
     upper = rising & (force >= base + UPPER_PART * (top - base))
     upper[max(int(np.argmax(force)) - 1, 0)] = True
-    way, force = span.way_um[span.loading][upper], force[upper]
-    apart = way - way.mean()
+    probe, force = span.probe_um[span.loading][upper], force[upper]
+    apart = probe - probe.mean()
     square = float(apart @ apart)
     if not square > 0.0:
         return None

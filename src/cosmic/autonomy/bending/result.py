@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.renamed import renamed_fields
 
 UN_UM2_PER_N_M2: Final = 1e18
 N_M2_PER_UN_UM2: Final = 1e-18
@@ -73,6 +74,7 @@ class Contribution:
     share: float
 
 
+@renamed_fields(ways_correlation="branches_correlation")
 @dataclass(frozen=True, slots=True, eq=False)
 class SpanFit:
     """One span with the model fitted to it.
@@ -99,7 +101,7 @@ class SpanFit:
     fitted_un : ndarray, shape (n,), float64
         The model at each point of the span, baseline included; nan where it was left out.
     flags : frozenset of Quality
-    out_std_part, back_std_part, ways_correlation : float
+    out_std_part, back_std_part, branches_correlation : float
         Standard deviations of ln(k) on the way out and back, and how they go together.
     by_friction : float
         Change of ln(k) on the way out for a friction of 1; that of the way back is the opposite.
@@ -128,7 +130,7 @@ class SpanFit:
     flags: frozenset[Quality]
     out_std_part: float = math.nan
     back_std_part: float = math.nan
-    ways_correlation: float = 0.0
+    branches_correlation: float = 0.0
     by_friction: float = 0.0
     by_side_out: float = 0.0
     by_side_back: float = 0.0

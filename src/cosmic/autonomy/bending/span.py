@@ -6,10 +6,12 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.autonomy.bending.curved import NaturalShape
+from cosmic.frame.renamed import renamed_fields
 
 Floats = npt.NDArray[np.float64]
 
 
+@renamed_fields(way_um="probe_um")
 @dataclass(frozen=True, slots=True, eq=False)
 class Span:
     """One push of the probe against a held fibre, out and back, at one position along it.
@@ -21,7 +23,7 @@ class Span:
     probe_x_um, hold_x_um : float
         Positions of the axes along the fibre as their encoders read them. Differences between the
         spans of one grasp are exact; the sum with `nominal_um` holds an offset common to all.
-    way_um : ndarray, shape (n,), float64
+    probe_um : ndarray, shape (n,), float64
         Position of the probe's axis across the fibre, growing as it pushes.
     force_un : ndarray, shape (n,), float64
         Mean force at each, positive when the fibre pushes back, with the baseline still in it.
@@ -39,7 +41,7 @@ class Span:
     nominal_um: float
     probe_x_um: float
     hold_x_um: float
-    way_um: Floats
+    probe_um: Floats
     force_un: Floats
     force_std_un: Floats
     time_s: Floats

@@ -85,7 +85,9 @@ class _Model:
         depth = settings.offset_um
         self.length_um = shape.lever_um(depth)
         first = rough(points, points.loading, free_force_un(points))
-        self.stroke_part = max(float(np.max(points.way_um)) - first.hinge_um, 0.0) / self.length_um
+        self.stroke_part = (
+            max(float(np.max(points.probe_um)) - first.hinge_um, 0.0) / self.length_um
+        )
         about = {
             "depth_um": depth,
             "radius_um": settings.radius_um,
@@ -103,10 +105,10 @@ class _Model:
         self.tied = 0 < clear < LEAST_CLEAR
 
     def contact(self, values: Floats) -> Floats:
-        force = np.zeros(len(self._points.way_um))
+        force = np.zeros(len(self._points.probe_um))
         for number, branch in enumerate(self.branches):
             log_k, hinge_um = values[2 * number], values[2 * number + 1]
-            ahead = self._points.way_um[branch] - hinge_um
+            ahead = self._points.probe_um[branch] - hinge_um
             force[branch] = self._force(ahead, log_k, self.curves[number])
         return np.asarray(force - values[-1] * (self._lost @ np.diff(force, prepend=0.0)))
 
@@ -120,7 +122,7 @@ class _Model:
 
     def slopes(self, values: Floats) -> Floats:
         """Return the derivatives of the force to each value, shape (points, values)."""
-        found = np.zeros((len(self._points.way_um), len(values)))
+        found = np.zeros((len(self._points.probe_um), len(values)))
         here = self.contact(values)
         for number in (*range(2 * len(self.branches)), len(values) - 1):
             more = values.copy()
@@ -165,10 +167,10 @@ class _Model:
 
     def single_std(self, values: Floats) -> Floats:
         """Return the noise foreseen of each reading by itself: the sensor's, and the stage's."""
-        points, slope = self._points, np.zeros(len(self._points.way_um))
+        points, slope = self._points, np.zeros(len(self._points.probe_um))
         for number, branch in enumerate(self.branches):
             # Just before the hinge too: there, a stage a little ahead has touched already.
-            ahead = points.way_um - values[2 * number + 1]
+            ahead = points.probe_um - values[2 * number + 1]
             pressed = ahead > -CLOSE_SIGMAS * self._settings.way_std_um
             slope[branch & pressed] = math.exp(min(values[2 * number], HIGHEST_LOG))
         return np.hypot(points.std_un, slope * self._settings.way_std_um)
@@ -185,12 +187,15 @@ class _Model:
     def _turning(self, values: Floats) -> Floats:
         """Return what is not known while the friction turns round, at the begin of the way back."""
         points, back = self._points, self.branches[1]
-        ahead = points.way_um[back] - values[3]
-        both = [self._force(ahead, values[2 * way], curve) for way, curve in enumerate(self.curves)]
-        top = float(np.max(points.way_um))
+        ahead = points.probe_um[back] - values[3]
+        both = [
+            self._force(ahead, values[2 * branch], curve)
+            for branch, curve in enumerate(self.curves)
+        ]
+        top = float(np.max(points.probe_um))
         stroke = max(top - values[1], 1.0)
-        found = np.zeros(len(points.way_um))
-        gone = (top - points.way_um[back]) / (TURNING_PART * stroke)
+        found = np.zeros(len(points.probe_um))
+        gone = (top - points.probe_um[back]) / (TURNING_PART * stroke)
         found[back] = np.abs(both[0] - both[1]) * np.exp(-gone)
         return found
 
@@ -232,7 +237,7 @@ class _Model:
         weak = np.array([*BRANCH_STDS * len(self.branches), *BASELINE_STDS, 1.0]) ** -2.0
         information = jacobian.T @ jacobian + np.diag(weak)
         covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
-        freedom = len(points.way_um) - len(values) + 1 + int(self.tied)
+        freedom = len(points.probe_um) - len(values) + 1 + int(self.tied)
         return _Found(values, covariance, chi2, freedom)
 
 
@@ -309,7 +314,7 @@ def _without_contact(span: Span, place_um: float, peak_un: float) -> SpanFit:
         peak_un=peak_un,
         chi2=0.0,
         freedom=0,
-        fitted_un=np.full(len(span.way_um), nan),
+        fitted_un=np.full(len(span.probe_um), nan),
         flags=frozenset({Quality.NO_CONTACT}),
     )
 
@@ -327,7 +332,7 @@ def _span_result(
     std = math.sqrt(1.0 / weights.sum()) if weights.sum() > 0.0 else math.inf
     k = math.exp(min(float(weights @ logs / weights.sum()), HIGHEST_LOG))
     baseline = model.baseline(values)
-    fitted = np.full(len(span.way_um), math.nan)
+    fitted = np.full(len(span.probe_um), math.nan)
     fitted[points.kept] = model.total(values)
     out, back = (values[:2], values[2:4]) if both else (values[:2], (math.nan, math.nan))
     stds = np.sqrt(np.diag(covariance))
@@ -350,7 +355,7 @@ def _span_result(
         flags=frozenset(),
         out_std_part=float(stds[0]),
         back_std_part=float(stds[2]) if both else math.nan,
-        ways_correlation=float(covariance[0, 2] / (stds[0] * stds[2])) if both else 0.0,
+        branches_correlation=float(covariance[0, 2] / (stds[0] * stds[2])) if both else 0.0,
         by_friction=model.by_friction(),
         by_side_out=model.by_side()[0],
         by_side_back=model.by_side()[1],
@@ -374,9 +379,9 @@ def _flags(
         flags.add(Quality.SATURATED)
     if lost_while_pushing(points):
         flags.add(Quality.BROKEN)
-    gave_way = _gave_way(fit, points, settings, model, values)
-    if gave_way is not None:
-        flags.add(gave_way)
+    yielded = _yielded(fit, points, settings, model, values)
+    if yielded is not None:
+        flags.add(yielded)
     if _differs(fit):
         flags.add(Quality.HYSTERESIS)
     if fit.k_std_un_um > fit.k_un_um * settings.soft_percent / 100.0:
@@ -400,20 +405,20 @@ def _differs(fit: SpanFit) -> bool:
         return False
     differs = math.log(fit.k_loading_un_um / fit.k_unloading_un_um)
     variance = fit.out_std_part**2 + fit.back_std_part**2
-    variance -= 2.0 * fit.ways_correlation * fit.out_std_part * fit.back_std_part
+    variance -= 2.0 * fit.branches_correlation * fit.out_std_part * fit.back_std_part
     allowed = 2.0 * MOST_FRICTION * abs(fit.by_friction) + MODEL_PART
     allowed += CLEAR_SIGMAS * math.sqrt(max(variance, 0.0))
     return not -allowed <= differs <= allowed + MOST_LOOP
 
 
-def _gave_way(
+def _yielded(
     fit: SpanFit, points: Points, settings: FitSettings, model: _Model, values: Floats
 ) -> Quality | None:
     """Return whether the fibre slipped in the jaws or stayed bent; None: neither."""
-    stroke = max(float(np.max(points.way_um)) - fit.hinge_um, 1e-3)
+    stroke = max(float(np.max(points.probe_um)) - fit.hinge_um, 1e-3)
     noise = fit.shift_std_um if math.isfinite(fit.shift_std_um) else math.inf
     allowed = math.hypot(CLEAR_SIGMAS * noise, SURE_TIMES * settings.reversal_um)
-    at_once_um, slowly, plain = _ways_to_give(points, model, values)
+    at_once_um, slowly, plain = _kinds_of_yielding(points, model, values)
     best = min(at_once_um[0], slowly)
     if plain > EXPLAINED_TIMES * max(best, 1.0):
         if slowly < at_once_um[0]:
@@ -424,7 +429,7 @@ def _gave_way(
     return Quality.SLIPPED if fit.shift_um > max(allowed, SLIPPED_PART * stroke) else None
 
 
-def _ways_to_give(
+def _kinds_of_yielding(
     points: Points, model: _Model, values: Floats
 ) -> tuple[tuple[float, float], float, float]:
     """Return how well the way out is explained by a slip at once, by yielding, and by neither.
@@ -437,7 +442,7 @@ def _ways_to_give(
     weight = 1.0 / model.single_std(values)[out]
     base = model.slopes(values)[out][:, [0, 1, -3, -1]]
     left = (points.force_un - model.total(values))[out]
-    travel, k = points.way_um[out], math.exp(min(values[0], HIGHEST_LOG))
+    travel, k = points.probe_um[out], math.exp(min(values[0], HIGHEST_LOG))
     freedom = max(len(out) - base.shape[1] - 2, 1)
 
     def explained(*extra: Floats) -> tuple[float, float]:

@@ -486,9 +486,9 @@ def force_figure(record: FibreRecord) -> str:
     curves = span_curves(record)
     if not curves:
         return ""
-    ways = np.concatenate([each.way_um for each in curves])
+    probes = np.concatenate([each.probe_um for each in curves])
     forces = np.concatenate([each.force_un for each in curves])
-    x = Axis("push beyond the first contact, µm", *around(float(ways.min()), float(ways.max())))
+    x = Axis("push beyond the first contact, µm", *around(float(probes.min()), float(probes.max())))
     y = Axis("force, µN", *around(float(forces.min()), float(forces.max())))
     plot = Plot(x, y, f"Force over push of fibre {record.number}")
     for curve in curves:
@@ -509,17 +509,17 @@ def _operation_bars(data: ReportData) -> str:
 
 
 def _draw(plot: Plot, curve: SpanCurve) -> None:
-    way, force, fitted = curve.way_um, curve.force_un, curve.fitted_un
+    probe, force, fitted = curve.probe_um, curve.force_un, curve.fitted_un
     for branch in (curve.loading, ~curve.loading):
         shown = branch & np.isfinite(fitted)
-        order = np.argsort(way[shown])
+        order = np.argsort(probe[shown])
         if shown.any():
-            plot.line(way[shown][order].tolist(), fitted[shown][order].tolist(), GREY)
+            plot.line(probe[shown][order].tolist(), fitted[shown][order].tolist(), GREY)
     back = ~curve.loading
-    plot.points(way[back].tolist(), force[back].tolist(), ORANGE, hollow=True)
-    plot.points(way[curve.loading].tolist(), force[curve.loading].tolist(), BLUE)
-    last = int(np.argmax(way))
-    plot.note(float(way[last]), float(force[last]), f"{curve.place_um:.0f} µm", end=True)
+    plot.points(probe[back].tolist(), force[back].tolist(), ORANGE, hollow=True)
+    plot.points(probe[curve.loading].tolist(), force[curve.loading].tolist(), BLUE)
+    last = int(np.argmax(probe))
+    plot.note(float(probe[last]), float(force[last]), f"{curve.place_um:.0f} µm", end=True)
 
 
 def residual_figure(record: FibreRecord) -> str:
@@ -529,7 +529,7 @@ def residual_figure(record: FibreRecord) -> str:
         return ""
     left = [each.force_un - each.fitted_un for each in curves]
     highest = max(float(np.nanmax(np.abs(each))) for each in left)
-    pushes = np.concatenate([each.way_um for each in curves])
+    pushes = np.concatenate([each.probe_um for each in curves])
     x = Axis("push beyond the first contact, µm", *around(float(pushes.min()), float(pushes.max())))
     y = Axis("force less model, µN", -1.1 * highest - 1e-6, 1.1 * highest + 1e-6)
     plot = Plot(x, y, f"Residuals of fibre {record.number}", height=180.0)
@@ -538,7 +538,10 @@ def residual_figure(record: FibreRecord) -> str:
         for branch, colour in ((curve.loading, BLUE), (~curve.loading, ORANGE)):
             shown = branch & np.isfinite(away)
             plot.points(
-                curve.way_um[shown].tolist(), away[shown].tolist(), colour, hollow=colour == ORANGE
+                curve.probe_um[shown].tolist(),
+                away[shown].tolist(),
+                colour,
+                hollow=colour == ORANGE,
             )
     return plot.svg()
 

@@ -165,7 +165,7 @@ class SpanCurve:
     ----------
     place_um : float
         From the tip of the jaws to the probe.
-    way_um, force_un, fitted_un : ndarray, shape (n,), float64
+    probe_um, force_un, fitted_un : ndarray, shape (n,), float64
         Push, force, and the model; nan where it was not fitted.
     loading : ndarray, shape (n,), bool
         True on the way out.
@@ -178,7 +178,7 @@ class SpanCurve:
     """
 
     place_um: float
-    way_um: Floats
+    probe_um: Floats
     force_un: Floats
     fitted_un: Floats
     loading: Mask
@@ -281,20 +281,20 @@ def span_curves(record: FibreRecord, *, most_points: int | None = None) -> tuple
 def _curve(
     span: Span, fit: SpanFit | None, *, used: bool, most_points: int | None
 ) -> SpanCurve | None:
-    kept = np.isfinite(span.way_um) & np.isfinite(span.force_un)
+    kept = np.isfinite(span.probe_um) & np.isfinite(span.force_un)
     if not kept.any():
         return None
     step = 1 if most_points is None else 1 + int(kept.sum()) // most_points
     every = slice(None, None, step)
     if fit is None or not math.isfinite(fit.hinge_um):
         level = np.full(len(kept), float(np.median(span.force_un[kept][:3])))
-        hinge_um, fitted = float(np.min(span.way_um[kept])), np.full(len(kept), np.nan)
+        hinge_um, fitted = float(np.min(span.probe_um[kept])), np.full(len(kept), np.nan)
     else:
         level = fit.baseline_un + fit.drift_un_s * (span.time_s - span.time_s[0])
         hinge_um, fitted = fit.hinge_um, fit.fitted_un
     return SpanCurve(
         place_um=span.nominal_um if fit is None else fit.place_um,
-        way_um=(span.way_um - hinge_um)[kept][every],
+        probe_um=(span.probe_um - hinge_um)[kept][every],
         force_un=(span.force_un - level)[kept][every],
         fitted_un=(fitted - level)[kept][every],
         loading=span.loading[kept][every],

@@ -358,7 +358,13 @@ def update(connection: sqlite3.Connection, table: str, row: Row, *, key: int) ->
 
 FORMAT = "cosmic fibre"
 FORMAT_VERSION = 1
-COLUMNS = ("way_um", "force_un", "force_std_un", "time_s")
+COLUMNS = {
+    "way_um": "probe_um",
+    "force_un": "force_un",
+    "force_std_un": "force_std_un",
+    "time_s": "time_s",
+}
+"""Columns of a span in the file, and what they are called in `Span`."""
 
 
 def curves_file(record: FibreRecord) -> bytes:
@@ -396,8 +402,8 @@ def _put_span(group: h5py.Group, span: Span) -> None:
             "hold_x_um": span.hold_x_um,
         }
     )
-    for name in COLUMNS:
-        group[name] = getattr(span, name)
+    for column, name in COLUMNS.items():
+        group[column] = getattr(span, name)
     group["loading"] = span.loading
     if span.shape is not None:
         group["shape_um"] = np.column_stack([span.shape.ahead_um, span.shape.aside_um])
@@ -433,17 +439,14 @@ def read_curves(path: Path) -> tuple[tuple[Span, ...], tuple[Floats, ...], tuple
 
 
 def _measured_span(group: h5py.Group) -> Span:
-    columns = {name: np.asarray(group[name]) for name in COLUMNS}
+    columns = {name: np.asarray(group[column]) for column, name in COLUMNS.items()}
     return Span(
         nominal_um=float(group.attrs["nominal_um"]),
         probe_x_um=float(group.attrs["probe_x_um"]),
         hold_x_um=float(group.attrs["hold_x_um"]),
-        way_um=columns["way_um"],
-        force_un=columns["force_un"],
-        force_std_un=columns["force_std_un"],
-        time_s=columns["time_s"],
         loading=np.asarray(group["loading"], dtype=np.bool_),
         shape=_natural_shape(group),
+        **columns,
     )
 
 

@@ -91,10 +91,10 @@ class Plot:
         self, xs: Sequence[float], ys: Sequence[float], colour: str = INK, *, dashed: bool = False
     ) -> None:
         """Draw a line through points."""
-        way = " ".join(f"{self._px(x):.1f},{self._py(y):.1f}" for x, y in zip(xs, ys, strict=True))
+        path = " ".join(f"{self._px(x):.1f},{self._py(y):.1f}" for x, y in zip(xs, ys, strict=True))
         dash = ' stroke-dasharray="5 4"' if dashed else ""
         self._parts.append(
-            f'<polyline points="{way}" fill="none" stroke="{colour}" stroke-width="1.3"{dash}/>'
+            f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.3"{dash}/>'
         )
 
     def points(

@@ -163,10 +163,10 @@ class ForceServo(Law):
         if self._mark is None:
             self._mark, self._mark_s = (position, force), 0.0
             return
-        way = self._goal.direction * (position - self._mark[0])
-        if self._mark_s < LEARN_S or abs(way) < LEARN_UM:
+        travelled = self._goal.direction * (position - self._mark[0])
+        if self._mark_s < LEARN_S or abs(travelled) < LEARN_UM:
             return
-        slope = (force - self._mark[1]) / way
+        slope = (force - self._mark[1]) / travelled
         self._mark, self._mark_s = (position, force), 0.0
         if self._adapts and slope > 0.0:
             seen = min(max(slope, SOFTEST_UN_UM), self._settings.stiffness_un_um)

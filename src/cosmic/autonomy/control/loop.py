@@ -14,7 +14,7 @@ from cosmic.autonomy.control.pace import LoopTimer, PaceStatistics, ask_real_tim
 from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.autonomy.control.sink import AxisSink
 from cosmic.autonomy.control.sources import Sample, Source
-from cosmic.autonomy.control.trace import ControlTrace, TraceKeeper
+from cosmic.autonomy.control.trace import ControlTrace, TraceRecorder
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import (
     CosmicError,
@@ -119,7 +119,7 @@ class ControlLoop(WorkerThread):
         self._settings = settings
         self._rate = rate or 1.0
         self._timer = LoopTimer(1.0 / settings.rate_hz)
-        self._trace = TraceKeeper(settings.rate_hz)
+        self._trace = TraceRecorder(settings.rate_hz)
         self._on_end = on_end
         self._lock = Lock()
         self._ending: ControlEnding | None = None

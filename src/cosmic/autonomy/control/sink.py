@@ -146,9 +146,9 @@ class AxisSink:
         """Go no farther than the axis is by now: nobody knows what that does; else as `rest`."""
         self.rest(dt_s)
         position = self._axis.details.position
-        under_way = self._sent is not None and not self._sent.done
+        moving = self._sent is not None and not self._sent.done
         taken = self._before is None or self._before.done
-        if under_way and taken and not self._braked and position is not None:
+        if moving and taken and not self._braked and position is not None:
             self._send(position)
             self._wanted = position
             self._braked = True
@@ -185,8 +185,8 @@ class AxisSink:
         self.packets += 1
 
     def _used_up(self) -> LimitError:
-        way = format_quantity(self._travel, self._axis.unit)
-        text = f"{self.name}: the loop's travel of {way} is used up"
+        travel = format_quantity(self._travel, self._axis.unit)
+        text = f"{self.name}: the loop's travel of {travel} is used up"
         return LimitError(
             refuse(
                 Reason.LIMIT,

@@ -36,7 +36,7 @@ class ControlTrace:
     position: Values
 
 
-class TraceKeeper:
+class TraceRecorder:
     """A ring of rows; one thread writes, any reads."""
 
     def __init__(self, rate_hz: float) -> None:

@@ -13,7 +13,7 @@ from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.autonomy.handling.force import ForceWatch
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Jaws, PlateFrame
-from cosmic.autonomy.handling.retrying_move import RetryingMove, way_back
+from cosmic.autonomy.handling.retrying_move import RetryingMove, return_movement
 from cosmic.autonomy.handling.settings import HandlingSettings, of_arm
 from cosmic.autonomy.handling.sight import LastSeen, LiveImage, map_at
 from cosmic.autonomy.procedures.failures import failure_of
@@ -335,7 +335,7 @@ class HandlingContext:
         return RetryingMove(
             lambda: self.mico.move(dict(targets), wait=False),
             to_a_position=True,
-            back=way_back(self.mico, targets),
+            back=return_movement(self.mico, targets),
         )
 
     def go_up(self, z_um: float) -> RetryingMove:

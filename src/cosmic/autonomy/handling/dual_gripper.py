@@ -16,7 +16,7 @@ from cosmic.frame.errors import MoveRefused
 from cosmic.frame.verdict import Reason
 from cosmic.vico.core.image import CameraImage
 
-IN_THE_WAY: Final = "other gripper in the way"
+OBSTRUCTED: Final = "other gripper in the way"
 NOT_FREE: Final = "jaws not free"
 NONE_HERE: Final = "no fibre for this gripper"
 NEAR_UM: Final = 100.0
@@ -114,7 +114,7 @@ class CarryInTurn(Carry):
             x, _ = other.tip_now(other.gripper)
             if not (behind_um(other) - x) * other.jaws.forward > -NEAR_UM:
                 raise OperationFailed(
-                    IN_THE_WAY, f"{other.gripper.shown} still holds a fibre near the probe"
+                    OBSTRUCTED, f"{other.gripper.shown} still holds a fibre near the probe"
                 )
 
     @override

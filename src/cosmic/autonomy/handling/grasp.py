@@ -31,14 +31,14 @@ class HeldShape:
 
     Attributes
     ----------
-    ahead_um, aside_um, way_um : ndarray, shape (n,), float64
+    ahead_um, aside_um, along_um : ndarray, shape (n,), float64
         Of positions along it, from the jaws' tip: along the jaws, in y, and along the fibre. Ends
         where the fibre turns back.
     """
 
     ahead_um: Floats
     aside_um: Floats
-    way_um: Floats
+    along_um: Floats
 
     @property
     def reach_um(self) -> float:
@@ -87,13 +87,13 @@ def held_shape(line_um: Floats, inside_um: float, forward: float) -> HeldShape:
     """
     whole = float(arc_lengths(line_um)[-1])
     near = np.linspace(max(0.0, inside_um - TANGENT_UM), min(whole, inside_um + TANGENT_UM), 25)
-    points = np.array([along(line_um, float(way)) for way in near])
+    points = np.array([along(line_um, float(at_um)) for at_um in near])
     slope = np.array([np.polyfit(near - inside_um, points[:, i], 2)[1] for i in (0, 1)])
     angle = (0.0 if forward > 0.0 else math.pi) - math.atan2(slope[1], slope[0])
     cos, sin = math.cos(angle), math.sin(angle)
     count = max(8, int((whole - inside_um) / STEP_UM))
     at = np.linspace(inside_um, whole, count)
-    free = np.array([along(line_um, float(way)) for way in at]) - along(line_um, inside_um)
+    free = np.array([along(line_um, float(at_um)) for at_um in at]) - along(line_um, inside_um)
     ahead = forward * (cos * free[:, 0] - sin * free[:, 1])
     aside = sin * free[:, 0] + cos * free[:, 1]
     rises = np.diff(ahead) > 0.0
@@ -143,7 +143,7 @@ def ahead_of_jaws(fibre: HeldFibre) -> Floats:
     """Return the begin of the free part of a fibre that still lies, on the platform."""
     last = min(BEGIN_UM + LENGTH_UM, fibre.free_um)
     at = np.linspace(fibre.inside_um + BEGIN_UM, fibre.inside_um + last, 40)
-    return np.array([along(line_of(fibre), float(way)) for way in at])
+    return np.array([along(line_of(fibre), float(at_um)) for at_um in at])
 
 
 def shape_of(work: HandlingContext, fibre: HeldFibre) -> HeldShape:

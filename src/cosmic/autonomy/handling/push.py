@@ -98,7 +98,7 @@ def ready_force(work: HandlingContext) -> Steps:
 
 NO_CONTACT: Final = "no contact"
 TOO_HIGH: Final = "force too high"
-IN_THE_WAY: Final = "probe in contact"
+OBSTRUCTED: Final = "probe in contact"
 UN_UM2: Final = 1e18
 LIMIT_PART: Final = 0.4
 """Of the force limit: what one step of the search may add at most."""
@@ -118,14 +118,14 @@ GROWTH: Final = 1.5
 class _Points:
     """What was measured on the way of one span."""
 
-    way_um: list[float] = field(default_factory=list)
+    probe_um: list[float] = field(default_factory=list)
     force_un: list[float] = field(default_factory=list)
     std_un: list[float] = field(default_factory=list)
     time_s: list[float] = field(default_factory=list)
     loading: list[bool] = field(default_factory=list)
 
-    def add(self, way_um: float, mean: ForceMean, *, loading: bool) -> None:
-        self.way_um.append(way_um)
+    def add(self, probe_um: float, mean: ForceMean, *, loading: bool) -> None:
+        self.probe_um.append(probe_um)
         self.force_un.append(mean.mean_un)
         self.std_un.append(max(mean.std_un, 1e-3))
         self.time_s.append(mean.time_s)
@@ -172,34 +172,36 @@ class OneSpan:
             raise
         self._keep()
 
-    def _way(self, tip_y_um: float) -> float:
+    def _to_probe(self, tip_y_um: float) -> float:
         return self._sign * tip_y_um
 
-    def _to_travel(self, way_um: float) -> RetryingMove:
-        return self._work.go({self._probe.y_axis: self._sign * way_um - self._probe.tip_um[1]})
+    def _to_travel(self, probe_um: float) -> RetryingMove:
+        return self._work.go({self._probe.y_axis: self._sign * probe_um - self._probe.tip_um[1]})
 
-    def _advance(self, way_um: float) -> Steps:
+    def _advance(self, probe_um: float) -> Steps:
         """Go there; more force than any push should reach ends it, before the limit would."""
         most = ceiling_un(self._push)
-        move = yield self._careful(way_um, -most, most)
+        move = yield self._careful(probe_um, -most, most)
         if isinstance(move, CarefulMove) and move.felt_un is not None:
             raise OperationFailed(
                 TOO_HIGH,
-                f"{move.felt_un:.0f} uN on the way of the probe, {self._plan.span_um:.0f} um from "
+                f"{move.felt_un:.0f} uN on the path of the probe, {self._plan.span_um:.0f} um from "
                 f"the jaws; more than {most:.0f} uN ends a push",
             )
 
-    def _careful(self, way_um: float, low_un: float, high_un: float) -> RetryingMove | CarefulMove:
+    def _careful(
+        self, probe_um: float, low_un: float, high_un: float
+    ) -> RetryingMove | CarefulMove:
         """Return a movement there that a force ends; nothing ends one that leads back."""
         _, y = self._work.tip_now(self._probe)
-        move = self._to_travel(way_um)
-        if way_um <= self._way(y):
+        move = self._to_travel(probe_um)
+        if probe_um <= self._to_probe(y):
             return move
         return CarefulMove(move, self._work.forces, low_un, high_un)
 
     def _withdraw(self) -> Steps:
         _, y = self._work.tip_now(self._probe)
-        yield self._to_travel(self._way(y) - self._push.stand_off_um - self._push.search_um)
+        yield self._to_travel(self._to_probe(y) - self._push.stand_off_um - self._push.search_um)
 
     def _surface_um(self) -> tuple[float, float]:
         """Return the way at which the probe should meet the fibre, and how sure that is."""
@@ -210,7 +212,7 @@ class OneSpan:
         _, hold_y = self._work.tip_now(self._work.gripper)
         _, off_y = self._work.calibration.probe_off_um
         bow = self._shape.bow_um(self._plan.span_um)
-        return self._way(hold_y + bow - off_y) - self._fibre.width_um / 2.0
+        return self._to_probe(hold_y + bow - off_y) - self._fibre.width_um / 2.0
 
     def _go_in_front(self) -> Steps:
         work, push = self._work, self._push
@@ -221,7 +223,7 @@ class OneSpan:
         bow = abs(self._shape.bow_um(self._plan.span_um))
         aside = surface - push.stand_off_um - push.bow_part * bow
         _, y = work.tip_now(self._probe)
-        if self._way(y) > aside:
+        if self._to_probe(y) > aside:
             yield self._to_travel(aside)
         if self._fibre.zero_un is None:
             self._fibre.zero_un = yield from self._mean_un(push.average_s)
@@ -234,7 +236,7 @@ class OneSpan:
         known = bool(self._fibre.contacts)
         yield from self._come_to(surface - push.near_um - SURE_TIMES * std if known else aside)
 
-    def _come_to(self, way_um: float) -> Steps:
+    def _come_to(self, probe_um: float) -> Steps:
         """Go there, and back again as long as something is felt that should not be there.
 
         The probe goes slowly, and no further where it feels something: nothing is known to be
@@ -244,13 +246,13 @@ class OneSpan:
         zero = self._fibre.zero_un or 0.0
         axis = work.mico[self._probe.y_axis]
         _, y = work.tip_now(self._probe)
-        if self._way(y) < way_um - SLOW_UM:
-            yield self._to_travel(way_um - SLOW_UM)
+        if self._to_probe(y) < probe_um - SLOW_UM:
+            yield self._to_travel(probe_um - SLOW_UM)
         while True:
             axis.set_closed_loop_frequency(min(push.slow_hz, work.settings.frequency_hz))
             try:
                 low, high = zero - push.surprise_un, zero + push.surprise_un
-                yield self._careful(way_um - back, low, high)
+                yield self._careful(probe_um - back, low, high)
             finally:
                 axis.set_closed_loop_frequency(work.settings.frequency_hz)
             force = yield from self._mean_un(push.search_average_s)
@@ -259,7 +261,7 @@ class OneSpan:
             back += push.stand_off_um
             if back > push.search_um + push.stand_off_um:
                 raise OperationFailed(
-                    IN_THE_WAY, f"the probe feels {force:.0f} uN where nothing should be"
+                    OBSTRUCTED, f"the probe feels {force:.0f} uN where nothing should be"
                 )
 
     def _mean_un(self, seconds: float) -> Generator[Yielded, object, float]:
@@ -271,16 +273,16 @@ class OneSpan:
         mean = yield self._work.forces.wanted(seconds, settle_s=self._push.settle_s)
         assert isinstance(mean, ForceMean)
         _, y = self._work.tip_now(self._probe)
-        self._points.add(self._way(y), mean, loading=loading)
-        return self._way(y), mean
+        self._points.add(self._to_probe(y), mean, loading=loading)
+        return self._to_probe(y), mean
 
     def _baseline(self) -> Generator[Yielded, object, float]:
         _, mean = yield from self._measure(self._push.average_s, loading=True)
         self._fibre.zero_un = mean.mean_un
         return mean.mean_un
 
-    def _to(self, way_um: float, seconds: float, *, loading: bool) -> Reading:
-        yield from self._advance(way_um)
+    def _to(self, probe_um: float, seconds: float, *, loading: bool) -> Reading:
+        yield from self._advance(probe_um)
         return (yield from self._measure(seconds, loading=loading))
 
     def _step_um(self) -> float:
@@ -293,7 +295,7 @@ class OneSpan:
 
     def _search(self, base_un: float) -> Generator[Yielded, object, float]:
         push, step = self._push, self._step_um()
-        travel = self._points.way_um[-1]
+        travel = self._points.probe_um[-1]
         end = self._surface_um()[0] + push.search_um
         while travel < end:
             before = travel
@@ -307,8 +309,8 @@ class OneSpan:
             f"{self._fibre.number} should be, {self._plan.span_um:.0f} um from the jaws",
         )
 
-    def _note_contact(self, way_um: float, std_um: float) -> None:
-        off = way_um - self._foreseen_um()
+    def _note_contact(self, probe_um: float, std_um: float) -> None:
+        off = probe_um - self._foreseen_um()
         self._fibre.contacts.append(Contact(self._plan.span_um, off, std_um, self._slope))
 
     def _place_contact(self, free_um: float) -> None:
@@ -320,13 +322,13 @@ class OneSpan:
         push, points = self._push, self._points
         step = self._plan.stroke_um / push.steps_out
         top = contact_um + self._plan.stroke_um
-        while points.way_um[-1] < top - 0.5 * step:
+        while points.probe_um[-1] < top - 0.5 * step:
             force, before = points.force_un[-1] - base_un, points.force_un[-2] - base_un
-            slope = max(0.0, (force - before) / max(points.way_um[-1] - points.way_um[-2], 0.5))
+            slope = max(0.0, (force - before) / max(points.probe_um[-1] - points.probe_um[-2], 0.5))
             if force + GROWTH * slope * step > push.limit_un:
                 break
             yield from self._to(
-                points.way_um[-1] + min(step, self._step_um()), push.average_s, loading=True
+                points.probe_um[-1] + min(step, self._step_um()), push.average_s, loading=True
             )
         if points.force_un[-1] - base_un > push.limit_un * GROWTH:
             raise OperationFailed(TOO_HIGH, f"{points.force_un[-1] - base_un:.0f} uN")
@@ -340,21 +342,21 @@ class OneSpan:
 
     def _back(self, contact_um: float) -> Steps:
         push = self._push
-        top, end = self._points.way_um[-1], contact_um - push.retreat_um / 2.0
+        top, end = self._points.probe_um[-1], contact_um - push.retreat_um / 2.0
         for travel in places_back_um(top, self._met_um(contact_um), end, push.steps_back):
             yield from self._to(travel, push.average_s, loading=False)
         yield from self._to(contact_um - push.retreat_um, push.average_s, loading=False)
 
     def _met_um(self, free_um: float) -> float:
         """Return about where the fibre was met, beyond where the probe was still free of it."""
-        base, ways = self._fibre.zero_un or 0.0, np.array(self._points.way_um)
+        base, paths = self._fibre.zero_un or 0.0, np.array(self._points.probe_um)
         forces = np.array(self._points.force_un) - base
-        first = int(np.argmax(ways > free_um))
+        first = int(np.argmax(paths > free_um))
         rise = float(forces[-1] - forces[first])
         if rise <= 0.0:
             return free_um
-        met = ways[first] - forces[first] * (ways[-1] - ways[first]) / rise
-        return float(min(max(met, free_um), ways[first]))
+        met = paths[first] - forces[first] * (paths[-1] - paths[first]) / rise
+        return float(min(max(met, free_um), paths[first]))
 
     def _keep(self) -> None:
         work, points = self._work, self._points
@@ -369,7 +371,7 @@ class OneSpan:
                 nominal_um=ahead + longer,
                 probe_x_um=probe_x - self._probe.tip_um[0] + longer * work.jaws.forward,
                 hold_x_um=hold_x - work.gripper.tip_um[0],
-                way_um=np.array(points.way_um),
+                probe_um=np.array(points.probe_um),
                 force_un=np.array(points.force_un),
                 force_std_un=np.array(points.std_un),
                 time_s=np.array(points.time_s),

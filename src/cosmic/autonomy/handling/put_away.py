@@ -34,13 +34,13 @@ class ToBin(FibreOperation):
             yield from retract_probe(work)
         yield work.rise(positions.travel_um)
         if work.held_fibre().bending is not None:
-            yield from self._look_on_the_way(work)
+            yield from self._look_while_moving(work)
         yield work.go(bin_position(work))
         with work.mico.collision.contact("grasp"):
             yield work.go_up(positions.bin_um)
 
     @staticmethod
-    def _look_on_the_way(work: HandlingContext) -> Steps:
+    def _look_while_moving(work: HandlingContext) -> Steps:
         """See that a measured fibre is still there: one that fell must not be measured again."""
         fibre, positions = work.held_fibre(), work.settings.places
         x = positions.view_x_um * work.jaws.forward

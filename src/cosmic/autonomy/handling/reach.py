@@ -188,8 +188,8 @@ def _off_um(work: HandlingContext, fibre: HeldFibre, image: CameraImage) -> floa
     line = line_of(fibre)
     order = np.argsort(line[:, 0])
     beside = float(np.interp(hold[0], line[order, 0], line[order, 1]))
-    way = float(np.interp(hold[0], line[order, 0], arc_lengths(line)[order]))
-    fibre.inside_um, fibre.free_um = way, fibre.length_um - way
+    inside = float(np.interp(hold[0], line[order, 0], arc_lengths(line)[order]))
+    fibre.inside_um, fibre.free_um = inside, fibre.length_um - inside
     return beside - float(hold[1])
 
 

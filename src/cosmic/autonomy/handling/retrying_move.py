@@ -170,7 +170,7 @@ class RetryingMove:
                 each.cancel()
 
 
-def way_back(mico: Mico, names: Iterable[str]) -> Callable[[], Movement | None]:
+def return_movement(mico: Mico, names: Iterable[str]) -> Callable[[], Movement | None]:
     """Return what orders a little of the way back to where these axes stand now."""
     began = {name: _position(mico, name) for name in names}
 

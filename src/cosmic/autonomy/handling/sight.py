@@ -211,10 +211,10 @@ def trace_along(image: CameraImage, line_px: Floats, reach_px: float) -> Trace:
 
 def _spaced(line: Floats) -> Floats:
     """Return points a pixel apart along a line."""
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    count = max(4, int(way[-1]) + 1)
-    at = np.linspace(0.0, way[-1], count)
-    return np.column_stack([np.interp(at, way, line[:, 0]), np.interp(at, way, line[:, 1])])
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    count = max(4, int(lengths[-1]) + 1)
+    at = np.linspace(0.0, lengths[-1], count)
+    return np.column_stack([np.interp(at, lengths, line[:, 0]), np.interp(at, lengths, line[:, 1])])
 
 
 def map_at(

@@ -31,7 +31,7 @@ from cosmic.vico.core.image import CameraImage
 
 NOT_HELD: Final = "no fibre held"
 NOT_THERE: Final = "not at the probe"
-GIVES_WAY: Final = "gives way"
+YIELDS: Final = "gives way"
 TOO_SHORT: Final = "too short"
 NEAR_UM: Final = 100.0
 """How far a gripper may be from where it holds a fibre before the probe."""
@@ -192,26 +192,26 @@ class _PushTo(OneSpan):
         points, wanted = self._points, self._plan.force_un
         while True:
             force = points.force_un[-1] - base_un
-            bend = points.way_um[-1] - contact_um
+            bend = points.probe_um[-1] - contact_um
             self._top = force, points.std_un[-1], bend
             if force >= wanted * (1.0 - NEAR_PART):
                 return
             if bend >= self._plan.stroke_um:
                 raise OperationFailed(
-                    GIVES_WAY,
+                    YIELDS,
                     f"the fibre gives way: {force:.0f} uN after {bend:.0f} um, "
                     f"{self._plan.span_um:.0f} um from the jaws",
                 )
             yield from self._to(
-                points.way_um[-1] + self._next_um(wanted - force),
+                points.probe_um[-1] + self._next_um(wanted - force),
                 self._push.average_s,
                 loading=True,
             )
 
     def _next_um(self, missing_un: float) -> float:
         """Return a step that leads to the force wanted, and not beyond it."""
-        way, force = self._points.way_um, self._points.force_un
-        slope = (force[-1] - force[-2]) / max(way[-1] - way[-2], 0.2)
+        probe, force = self._points.probe_um, self._points.force_un
+        slope = (force[-1] - force[-2]) / max(probe[-1] - probe[-2], 0.2)
         step = self._step_um()
         return max(0.2, min(step, missing_un / slope) if slope > 0.0 else step)
 

@@ -135,9 +135,9 @@ def best_circle(angles_deg: list[float], lines: list[Floats]) -> RotationFit:
     fits: list[RotationFit] = []
     refusal = CalibrationRefused("rotation centre: no fibre was followed")
     for index in range(3):
-        way = [(float(each[index][0]), float(each[index][1])) for each in lines]
+        points = [(float(each[index][0]), float(each[index][1])) for each in lines]
         try:
-            fits.append(fit_rotation(angles_deg, way))
+            fits.append(fit_rotation(angles_deg, points))
         except CalibrationRefused as exc:
             refusal = exc
     if not fits:

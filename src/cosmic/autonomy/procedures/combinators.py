@@ -340,7 +340,7 @@ class Holding(Node[W]):
             )
         finally:
             for each in wanted:
-                each.give_back(token)
+                each.release(token)
 
     def _held(self, position: TreePosition[W]) -> NodeSteps:
         mark = len(position.context.begun)

@@ -138,7 +138,7 @@ class Executor(Generic[W]):
         """Cancel what moves, close all that was begun, and wait a moment for it to come to rest."""
         left = branch.end()
         until_s = WALL.now_s() + ENDING_WALL_S
-        while left.under_way() and WALL.now_s() < until_s:
+        while left.running() and WALL.now_s() < until_s:
             now_s = self._control.clock.now_s()
             self._control.wait(now_s + self._control.look_s)
 

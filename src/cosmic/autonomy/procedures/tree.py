@@ -32,7 +32,7 @@ class NodeState(StrEnum):
 
 
 ENDS = frozenset({NodeState.DONE, NodeState.FAILED, NodeState.ENDED})
-UNDER_WAY = frozenset(
+RUNNING_STATES = frozenset(
     {
         NodeState.RUNNING,
         NodeState.QUEUED,

@@ -115,7 +115,7 @@ class Pending(ABC):
         """End what was begun; harmless the second time."""
         return
 
-    def under_way(self) -> bool:
+    def running(self) -> bool:
         """Tell whether something begun has not yet ended, cancelled or not."""
         return False
 
@@ -206,7 +206,7 @@ class ForAwaited(Pending):
             logger.warning("could not be cancelled: %s", exc)
 
     @override
-    def under_way(self) -> bool:
+    def running(self) -> bool:
         return not self._awaited.done
 
 
@@ -235,8 +235,8 @@ class ForAny(Pending):
             part.cancel()
 
     @override
-    def under_way(self) -> bool:
-        return any(part.under_way() for part in self._parts)
+    def running(self) -> bool:
+        return any(part.running() for part in self._parts)
 
 
 class Watch:
@@ -286,8 +286,8 @@ class Watched(Pending):
         self._part.cancel()
 
     @override
-    def under_way(self) -> bool:
-        return self._part.under_way()
+    def running(self) -> bool:
+        return self._part.running()
 
 
 class ForEnd(Pending):
@@ -301,15 +301,15 @@ class ForEnd(Pending):
 
     @override
     def ready(self) -> bool:
-        return not self.under_way() or self._clock.now_s() >= self._until_s
+        return not self.running() or self._clock.now_s() >= self._until_s
 
     @override
     def look_again_s(self, now_s: float) -> float:
         return min(now_s + self._look_s, self._until_s)
 
     @override
-    def under_way(self) -> bool:
-        return any(part.under_way() for part in self._parts)
+    def running(self) -> bool:
+        return any(part.running() for part in self._parts)
 
 
 def pending_of(yielded: object, control: RunControl) -> Pending:
@@ -367,7 +367,7 @@ class Resource:
         """Tell whether it is the turn of `who`."""
         return bool(self._queue) and self._queue[0] is who
 
-    def give_back(self, who: object) -> None:
+    def release(self, who: object) -> None:
         """Let the next one have it, or wait for it no longer."""
         with suppress(ValueError):
             self._queue.remove(who)

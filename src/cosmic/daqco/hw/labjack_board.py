@@ -162,7 +162,7 @@ class LabjackBoard(Board):
                 self._api.setStreamCallback(run.handle, lambda _handle: self._on_scans(run))
             except self._api.LJMError as exc:
                 self._run = None
-                self._give_back()
+                self._release()
                 raise self._as_device_error(board_error(exc, "start", self._info.name)) from exc
             if made_hz != setup.rate_hz:
                 self.stop()
@@ -200,7 +200,7 @@ class LabjackBoard(Board):
                 return
             run.end(None)
             if not self._end_stream(run.handle):
-                self._give_back()
+                self._release()
 
     @override
     def close(self) -> None:
@@ -226,7 +226,7 @@ class LabjackBoard(Board):
             self._write_settings(handle, setup)
             made_hz = self._stream(handle, setup)
         except self._api.LJMError as exc:
-            self._give_back()
+            self._release()
             raise board_error(exc, "configure", self._info.name) from exc
         self._end_stream(handle)
         return made_hz
@@ -361,9 +361,9 @@ class LabjackBoard(Board):
                 run.over = True
                 self._run = None
                 self._end_stream(run.handle)
-                self._give_back()
+                self._release()
 
-    def _give_back(self) -> None:
+    def _release(self) -> None:
         """Let go of a handle that has failed; a board that was lost may be back."""
         self._connection.renew()
 

@@ -18,14 +18,14 @@ class Connection:
         ``labjack.ljm``.
     kind : str
         "T4", "T7" or "T8".
-    way : str
+    bus : str
         "ANY", "USB", "ETHERNET" or "WIFI".
     """
 
-    def __init__(self, api: Any, board: str, kind: str, serial: int, way: str) -> None:
+    def __init__(self, api: Any, board: str, kind: str, serial: int, bus: str) -> None:
         self._api = api
         self._board = board
-        self._where = (kind, way, str(serial))
+        self._where = (kind, bus, str(serial))
         self._lock = RLock()
         self._users: set[object] = set()
         self._handle: int | None = None

@@ -40,7 +40,7 @@ class LabjackOptions(StrictModel):
     Attributes
     ----------
     connection : str
-        By which way boards are looked for.
+        Where boards are looked for.
     resolution_index : int
         Of the stream; 0 is the board's own choice, a higher one less noise and lower rates.
     """
@@ -142,18 +142,18 @@ class LabjackLibrary(BoardLibrary):
     def list_boards(self) -> tuple[BoardInfo, ...]:
         api = self._loaded()
         try:
-            _, kinds, ways, serials, _ = api.listAllS("ANY", self._options.connection.upper())
+            _, kinds, buses, serials, _ = api.listAllS("ANY", self._options.connection.upper())
         except api.LJMError as exc:
             raise board_error(exc, "list the boards", "LJM") from exc
         found: dict[int, BoardInfo] = {}
         # One that is connected twice is listed twice; LJM opens it by USB.
-        for way, kind, serial in sorted(
-            zip(ways, kinds, serials, strict=True), key=lambda each: each[0] != USB
+        for bus, kind, serial in sorted(
+            zip(buses, kinds, serials, strict=True), key=lambda each: each[0] != USB
         ):
             if kind in KINDS:
                 found.setdefault(serial, info_of(kind, serial))
             else:
-                logger.info("LJM: the device %s of type %s (%s) is left out", serial, kind, way)
+                logger.info("LJM: the device %s of type %s (%s) is left out", serial, kind, bus)
         return tuple(found[serial] for serial in sorted(found))
 
     @override
@@ -186,8 +186,8 @@ class LabjackLibrary(BoardLibrary):
 
     def _connection(self, info: BoardInfo) -> Connection:
         with self._lock:
-            way = self._options.connection.upper()
-            made = Connection(self._api, info.name, info.product, info.serial, way)
+            bus = self._options.connection.upper()
+            made = Connection(self._api, info.name, info.product, info.serial, bus)
             return self._connections.setdefault(info.name, made)
 
     def _loaded(self) -> Any:

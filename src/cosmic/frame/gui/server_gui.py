@@ -184,7 +184,7 @@ def hide_stale_tab_bars(window: QMainWindow) -> None:
 
 
 Area = Qt.DockWidgetArea
-Way = Qt.Orientation
+Run = Qt.Orientation
 
 LOG_TITLE: Final = "Log"
 """A click on the message in the bar brings the panel with this title to the front."""
@@ -237,7 +237,7 @@ class CosmicServerGui(QMainWindow):
         self._docks: dict[str, PanelDock] = {}
         self._keys: KeyList = ()
         self._keys_dialog: KeysDialog | None = None
-        self._shares: list[tuple[tuple[str, ...], tuple[int, ...], Way]] = []
+        self._shares: list[tuple[tuple[str, ...], tuple[int, ...], Run]] = []
         self._restored = False
         self._settings = settings
         self._workspaces: Workspaces | None = None
@@ -351,7 +351,7 @@ class CosmicServerGui(QMainWindow):
             self.setStatusBar(bar)
         return self._drawer
 
-    def share_out(self, titles: Sequence[str], shares: Sequence[int], direction: Way) -> None:
+    def share_out(self, titles: Sequence[str], shares: Sequence[int], direction: Run) -> None:
         """Have panels that stand in a row or a column share its length so at a first start."""
         self._shares.append((tuple(titles), tuple(shares), direction))
 
@@ -433,7 +433,7 @@ class CosmicServerGui(QMainWindow):
         heights = [height if below else self.height() - height for below in bottom.values()]
         self.resizeDocks(list(bottom), heights, Qt.Orientation.Vertical)
         for titles, shares, direction in self._shares:
-            room = self.height() - height if direction is Way.Vertical else self.width()
+            room = self.height() - height if direction is Run.Vertical else self.width()
             lengths = [room * share // sum(shares) for share in shares]
             self.resizeDocks([self._docks[title] for title in titles], lengths, direction)
 

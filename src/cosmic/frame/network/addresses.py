@@ -13,7 +13,7 @@ def asks(station: str, client: str) -> str:
     return f"cosmic/{station}/ask/{client}"
 
 
-def client_signs(station: str, client: str = "**") -> str:
+def client_liveliness(station: str, client: str = "**") -> str:
     """Sign of life of a client."""
     return f"cosmic/{station}/client/{client}"
 

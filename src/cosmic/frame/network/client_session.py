@@ -10,7 +10,7 @@ from typing import Any, Final
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ProtocolError
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.network.addresses import asks, client_signs, greetings, session_events
+from cosmic.frame.network.addresses import asks, client_liveliness, greetings, session_events
 from cosmic.frame.network.delivery import InboxReader
 from cosmic.frame.network.direct_line import DirectLine, LineLost
 from cosmic.frame.network.direct_lines import DirectLines
@@ -19,7 +19,7 @@ from cosmic.frame.network.freshness import StationTime
 from cosmic.frame.network.messages import Order, Request, read_answer
 from cosmic.frame.network.station import checked_name
 from cosmic.frame.network.transport import Rule
-from cosmic.frame.network.wire import Sign, Wire, WithLine
+from cosmic.frame.network.wire import Liveliness, Wire, WithLine
 
 logger = logging.getLogger(__name__)
 
@@ -76,7 +76,7 @@ class ClientSession:
         self._number = 0
         self._token = ""
         self._answered_s = float("-inf")
-        self._sign: Sign | None = None
+        self._liveliness: Liveliness | None = None
         self._events: InboxReader[bytes] | None = None
         self._direct: DirectLines | None = None
 
@@ -100,7 +100,7 @@ class ClientSession:
         with self._lock:
             self._time.forget()
             self._key, self._number, self._token = greetings(self._station, client), 0, ""
-        self._sign = wire.sign(client_signs(self._station, client))
+        self._liveliness = wire.liveliness(client_liveliness(self._station, client))
         inbox = wire.inlet(session_events(self._station, client), Rule.ALL)
         name = f"{self._station} tells"
         self._events = InboxReader(name, self._policy, inbox, self._on_event)
@@ -126,7 +126,7 @@ class ClientSession:
         try:
             return DirectLines(opened)
         except LineLost as exc:
-            logger.info("%s: calls go the slower way: %s", self._station, exc)
+            logger.info("%s: calls use the slower connection: %s", self._station, exc)
             return None
 
     def _find_handler(self, wire: Wire) -> None:
@@ -148,9 +148,9 @@ class ClientSession:
         direct, self._direct = self._direct, None
         if direct is not None:
             direct.close()
-        sign, self._sign = self._sign, None
-        if sign is not None:
-            sign.close()
+        liveliness, self._liveliness = self._liveliness, None
+        if liveliness is not None:
+            liveliness.close()
         events, self._events = self._events, None
         if events is not None:
             events.request_end()

@@ -46,7 +46,7 @@ _BEAT_LIMIT_S: Final = 0.5
 class ClientSideConnection(WorkerThread):
     """A `Transport` over a line, which connects by itself and says why it is away.
 
-    While the station is there, signs of life go to it ten times a second. Start it like any
+    While the station is there, heartbeats go to it ten times a second. Start it like any
     thread; `close` in a ``finally``.
 
     Parameters

@@ -55,7 +55,7 @@ class Client:
 class ConnectionHandler(WorkerThread):
     """Serves one client in a thread of its own (thesis Fig. 5.6, 5.7).
 
-    It checks what comes, carries out what must not wait (a stop, signs of life), and hands every
+    It checks what comes, carries out what must not wait (a stop, heartbeats), and hands every
     other call to the thread of the application concerned.
 
     Parameters

@@ -14,7 +14,7 @@ class Pulse:
     Parameters
     ----------
     limit_s : float
-        Silence after which it has ended and no later sign of life revives it.
+        Silence after which it has ended and no later heartbeat revives it.
     """
 
     def __init__(self, name: str, *, limit_s: float, clock: Clock) -> None:
@@ -26,7 +26,7 @@ class Pulse:
         self._why = ""
 
     def beat(self, sent_s: float) -> None:
-        """Note a sign of life that was sent at `sent_s` of this station's clock."""
+        """Note a heartbeat that was sent at `sent_s` of this station's clock."""
         with self._lock:
             self._look(self._limit_s)
             if not self._why and sent_s <= self._clock.now_s():
@@ -71,7 +71,7 @@ class Pulse:
 
 
 class DeadMan:
-    """A deadline that only the holder's signs of life put off; polled by the thread that moves.
+    """A deadline that only the holder's heartbeats put off; polled by the thread that moves.
 
     Once expired it stays so: going on needs a new command.
     """

@@ -64,12 +64,12 @@ class DirectLines:
         try:
             answer = line.ask(message, timeout_s)
         except LineLost:
-            self._give_back(line, broken=True)
+            self._release(line, broken=True)
             raise
         except BaseException:
-            self._give_back(line)
+            self._release(line)
             raise
-        self._give_back(line)
+        self._release(line)
         return answer
 
     def close(self) -> None:
@@ -119,7 +119,7 @@ class DirectLines:
         line.close()
         return None
 
-    def _give_back(self, line: DirectLine, *, broken: bool = False) -> None:
+    def _release(self, line: DirectLine, *, broken: bool = False) -> None:
         with self._lock:
             self._lent.remove(line)
             urgent = line is self._urgent

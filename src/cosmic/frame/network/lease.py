@@ -55,7 +55,7 @@ class StationLease:
     """The right to move; any thread. `stop` never asks for it.
 
     While nobody else holds it, it is this process's own. Another session takes it with its token
-    and keeps it as long as its signs of life come. The local operator takes it over at any time;
+    and keeps it as long as its heartbeats come. The local operator takes it over at any time;
     from then on it is not given away until it is offered again.
 
     Parameters
@@ -105,7 +105,7 @@ class StationLease:
         Parameters
         ----------
         in_process : bool
-            The session lives and dies with this process, and so sends no signs of life.
+            The session lives and dies with this process, and so sends no heartbeats.
         keep_s : float
             Silence that ends it and what moves by it. A motion without an end of its own bears no
             more than before.
@@ -160,7 +160,7 @@ class StationLease:
         self._publish()
 
     def beat(self, token: str, sent_s: float) -> None:
-        """Note a sign of life of the session `token`, sent at `sent_s` of this station's clock."""
+        """Note a heartbeat of the session `token`, sent at `sent_s` of this station's clock."""
         with self._lock:
             held = self._grant
         if held is not None and secrets.compare_digest(held.token, token):

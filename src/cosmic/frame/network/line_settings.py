@@ -7,7 +7,7 @@ from typing import Any, Final
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.network.addresses import (
     asks,
-    client_signs,
+    client_liveliness,
     greetings,
     session_events,
 )
@@ -170,13 +170,13 @@ def _access_control(station: str, clients: tuple[str, ...]) -> dict[str, Any]:
                 f"{name} shows itself",
                 ["liveliness_token"],
                 "ingress",
-                client_signs(station, its_own),
+                client_liveliness(station, its_own),
             ),
             _rule(
                 f"{name} is looked for",
                 ["declare_liveliness_subscriber", "liveliness_query"],
                 "egress",
-                client_signs(station),
+                client_liveliness(station),
             ),
             _rule(
                 f"{name} subscribes",

@@ -35,7 +35,7 @@ _CLOCK_S: Final = 20.0
 _READINGS: Final = 5
 
 
-class _Keeper(WorkerThread):
+class _LinkWatcher(WorkerThread):
     """Calls `look` again and again."""
 
     def __init__(self, name: str, look: Callable[[], None], policy: FailurePolicy) -> None:
@@ -82,7 +82,7 @@ class ApplicationLink:
         self._transport = transport
         self._name = name
         self.commands = StationCommands(transport, name, policy, self)
-        self._keeper = _Keeper(f"remote {name}", self._look, policy)
+        self._watcher = _LinkWatcher(f"remote {name}", self._look, policy)
         self._lock = Lock()
         self.state = KnownState(self.root)
         self._streams: dict[tuple[str, ...], RemoteStream] = {}
@@ -165,7 +165,7 @@ class ApplicationLink:
             self.stream(self.root, name).keep()
         self._subscription = self._transport.subscribe(topic, Rule.LATEST, self._on_state)
         self._end_presence = self._transport.presence(self._on_presence)
-        self._keeper.start()
+        self._watcher.start()
 
     def wait_until_known(self, timeout_s: float) -> bool:
         """Wait until it is known how things stand there; False where it is not in time."""
@@ -180,10 +180,10 @@ class ApplicationLink:
         self.let_go()
         self._end_presence()
         self.commands.end_motion()
-        self._keeper.request_end()
+        self._watcher.request_end()
         self.commands.close()
-        if not self._keeper.join():
-            logger.error("%s does not end", self._keeper.name)
+        if not self._watcher.join():
+            logger.error("%s does not end", self._watcher.name)
         for companion in self._companions:
             companion.close()
         subscription, self._subscription = self._subscription, None

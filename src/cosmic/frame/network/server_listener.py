@@ -13,8 +13,8 @@ from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.log_folding import flush_folded
 from cosmic.frame.network.addresses import (
     asks,
+    client_liveliness,
     client_of,
-    client_signs,
     greetings,
     session_events,
 )
@@ -36,7 +36,7 @@ logger = logging.getLogger(__name__)
 
 LOOK_EVERY_S: Final = 0.05
 SILENCE_LIMIT_S: Final = 5.0
-"""A session of which nothing was heard for so long has ended, whatever its sign of life says."""
+"""A session of which nothing was heard for so long has ended, whatever its heartbeat says."""
 CLIENTS_LIMIT: Final = 32
 OF_ONE_NAME: Final = 16
 """One client alone cannot keep all others out."""
@@ -93,10 +93,13 @@ class ServerListener(WorkerThread):
         questions = InboxReader(
             f"{name} hears", policy, self._wire.questions(greetings(name)), self._greet
         )
-        signs = InboxReader(
-            f"{name} watches", policy, self._wire.signs(client_signs(name)), self._on_sign
+        watched = InboxReader(
+            f"{name} watches",
+            policy,
+            self._wire.watch_liveliness(client_liveliness(name)),
+            self._on_liveliness,
         )
-        self._readers = [questions, signs, *([self._direct] if self._direct else [])]
+        self._readers = [questions, watched, *([self._direct] if self._direct else [])]
         self._remove = [
             self._station.bus.tap(self._outbox.publish, self._outbox.wants),
             self._station.lease.subscribe(lambda _: self._end_motion_without_lease()),
@@ -198,7 +201,7 @@ class ServerListener(WorkerThread):
         try:
             return DirectListener(name, self._wire.line, self._station.policy, self._attach)
         except OSError as exc:
-            logger.warning("%s: calls go the slower way: %s", self._station.name, exc)
+            logger.warning("%s: calls use the slower connection: %s", self._station.name, exc)
             return None
 
     def _attach(
@@ -229,8 +232,8 @@ class ServerListener(WorkerThread):
 
     # Signs of life, in the thread "watches"
 
-    def _on_sign(self, sign: tuple[str, bool]) -> None:
-        key, here = sign
+    def _on_liveliness(self, liveliness: tuple[str, bool]) -> None:
+        key, here = liveliness
         if here:
             return
         client = client_of(key)
@@ -247,7 +250,7 @@ class ServerListener(WorkerThread):
         self._station.lease.poll()
         self._refusals.answer_due()
         while len(self._gone):
-            self._end(self._gone.take(), "its sign of life is gone")
+            self._end(self._gone.take(), "its heartbeat has stopped")
         self._leaving = [each for each in self._leaving if not each.ended]
         with self._lock:
             silent = [

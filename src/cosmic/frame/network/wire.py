@@ -43,8 +43,8 @@ class Outlet(Protocol):
         """Release it."""
 
 
-class Sign(Protocol):
-    """A sign of life that others see as long as it stands and the line holds."""
+class Liveliness(Protocol):
+    """A token that others see as long as it stands and the line holds."""
 
     @abstractmethod
     def close(self) -> None:
@@ -79,12 +79,12 @@ class Wire(Protocol):
         """Receive the messages under `key`."""
 
     @abstractmethod
-    def sign(self, key: str) -> Sign:
-        """Set up a sign of life."""
+    def liveliness(self, key: str) -> Liveliness:
+        """Set up a token that says that this end is alive."""
 
     @abstractmethod
-    def signs(self, keys: str) -> Inbox[tuple[str, bool]]:
-        """Receive signs of life as they come (True) and go (False), those there are first."""
+    def watch_liveliness(self, keys: str) -> Inbox[tuple[str, bool]]:
+        """Receive tokens as they come (True) and go (False), those there are first."""
 
     @abstractmethod
     def close(self) -> None:

@@ -19,7 +19,7 @@ from cosmic.frame.network.delivery import Inbox, InboxClosed
 from cosmic.frame.network.errors import StationAway, StationTimeout
 from cosmic.frame.network.line_settings import Line
 from cosmic.frame.network.transport import Rule
-from cosmic.frame.network.wire import Outlet, Question, Sign, Wire
+from cosmic.frame.network.wire import Liveliness, Outlet, Question, Wire
 
 logger = logging.getLogger(__name__)
 T = TypeVar("T")
@@ -115,14 +115,14 @@ class ZenohWire(Wire):
         )
 
     @override
-    def sign(self, key: str) -> Sign:
+    def liveliness(self, key: str) -> Liveliness:
         try:
-            return _ZenohSign(self._session.liveliness().declare_token(key))
+            return _ZenohLiveliness(self._session.liveliness().declare_token(key))
         except zenoh.ZError as exc:
             raise StationAway(f"the line is closed: {exc}") from exc
 
     @override
-    def signs(self, keys: str) -> Inbox[tuple[str, bool]]:
+    def watch_liveliness(self, keys: str) -> Inbox[tuple[str, bool]]:
         return self._inbox(
             lambda: self._session.liveliness().declare_subscriber(
                 keys, zenoh.handlers.FifoChannel(_QUEUE), history=True
@@ -231,7 +231,7 @@ class _ZenohOutlet(Outlet):
                 _undeclare(self._publisher)
 
 
-class _ZenohSign(Sign):
+class _ZenohLiveliness(Liveliness):
     def __init__(self, token: "zenoh.LivelinessToken") -> None:
         self._token = token
 

@@ -24,7 +24,7 @@ from cosmic.frame.network.caller import current_call
 from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.transport import Rule
 from cosmic.frame.operation import Operation, Progress, Task, wait_or_cancel
-from cosmic.frame.renamed import Renamed
+from cosmic.frame.renamed import Renamed, renamed_parameters
 from cosmic.frame.threads import forbid_waiting_here, may_wait_here
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.frame.weakly import weakly
@@ -711,8 +711,8 @@ class Mico(Declared):
             Called in the GUI thread.
         """
         forbid_waiting_here("planning a path")
-        places = {name: self._in_gate(name, value) for name, value in targets.items()}
-        return self._application.plan_path(places, budget_s)
+        goal = {name: self._in_gate(name, value) for name, value in targets.items()}
+        return self._application.plan_path(goal, budget_s)
 
     @command
     def begin_search(self, targets: dict[str, float], budget_s: float) -> Operation[PlannedPath]:
@@ -722,13 +722,14 @@ class Mico(Declared):
         return self._home.begin_search(targets, budget_s)
 
     @command(moves=True)
-    def begin_detour(self, way: PlannedPath, *, source: str = "script") -> Task:
-        """Begin to go a path that was found, where the axes are; see `follow`."""
-        return self._home.follow_path(way, source_of(source))
+    def begin_detour(self, path: PlannedPath, *, source: str = "script") -> Task:
+        """Begin to follow a planned path, where the axes are; see `follow`."""
+        return self._home.follow_path(path, source_of(source))
 
+    @renamed_parameters(way="path")
     def follow(
         self,
-        way: PlannedPath,
+        path: PlannedPath,
         progress: Callable[[Progress], None] | None = None,
         *,
         wait: bool = True,
@@ -742,7 +743,7 @@ class Mico(Declared):
         MoveRefused
             The gate refused a part: something has moved since.
         """
-        return self._follow(self._application.follow_path(way, self._source), progress, wait=wait)
+        return self._follow(self._application.follow_path(path, self._source), progress, wait=wait)
 
     def move_around(
         self, targets: Mapping[str, Number], *, budget_s: float = PATH_BUDGET_S, wait: bool = True

@@ -1,4 +1,4 @@
-"""`PlanMovable`: the device that plans of bluesky move, which an axis is under both of its names."""
+"""`PlanMovable`: an axis as plans of bluesky move it, under either of its names."""
 
 import math
 from abc import abstractmethod

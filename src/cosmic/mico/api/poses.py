@@ -10,6 +10,7 @@ from cosmic.frame.declaration import Declared, command, state
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable, UnknownAxisError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Task, wait_or_cancel
+from cosmic.frame.renamed import renamed_parameters
 from cosmic.mico.api.entry import source_of
 from cosmic.mico.api.group import move_together
 from cosmic.mico.api.trajectory_site import TrajectorySite
@@ -125,13 +126,14 @@ class Poses(Declared):
         self._site.poses.remove(name)
         self.note_change()
 
-    def go(self, name: str, *, way: bool = False, wait: bool = True) -> Task:
+    @renamed_parameters(way="detour")
+    def go(self, name: str, *, detour: bool = False, wait: bool = True) -> Task:
         """Move to a pose, all its axes together.
 
         Parameters
         ----------
-        way : bool
-            Have a way found round what is in between; else the gate decides the straight one.
+        detour : bool
+            Plan a path around what is in between; else the gate decides the straight one.
         wait : bool
             False returns at once; the task has `progress`, `cancel` and `wait`.
 
@@ -141,30 +143,30 @@ class Poses(Declared):
             There is no such pose, it names an axis that is not there, or another long operation is
             under way.
         MoveRefused
-            The gate refused it; with `way`, none was found.
+            The gate refused it; with `detour`, no path was found.
         """
-        task = self.begin(name, way=way, source=self._source)
+        task = self.begin(name, detour=detour, source=self._source)
         if wait:
             wait_or_cancel(task)
         return task
 
     @command(moves=True)
-    def begin(self, name: str, *, way: bool = False, source: str = "script") -> Task:
+    def begin(self, name: str, *, detour: bool = False, source: str = "script") -> Task:
         """Begin to move to a pose, where the axes are; raises `NotAvailable` as `go`."""
         pose, said = self._site.poses[name], source_of(source)
         wrong = pose_misfits({name: pose}, self._site.manager.settings.kinds)
         if wrong:
             raise NotAvailable(f"pose {'; '.join(wrong)}")
         return self._site.worker.begin(
-            f"Going to {name}", lambda task: self._go(pose, task, said, way=way)
+            f"Going to {name}", lambda task: self._go(pose, task, said, detour=detour)
         )
 
-    def _go(self, pose: Pose, task: Task, source: str, *, way: bool) -> None:
+    def _go(self, pose: Pose, task: Task, source: str, *, detour: bool) -> None:
         manager = self._site.manager
         try:
             parts = [pose.positions]
             model = self._site.worker.collision
-            if way and model is not None and model.available:
+            if detour and model is not None and model.available:
                 task.report(0.0, "planning a path")
                 parts = list(self._site.worker.plan_path(pose.positions, PATH_BUDGET_S).waypoints)
             for number, targets in enumerate(parts):

@@ -397,7 +397,7 @@ class Trajectories(Declared):
         ----------
         start : str
             What to do where axes do not stand where it begins: "refuse", go there "straight" and
-            together, or have a "way" found.
+            together, or by a planned "detour".
         speed : float
             How fast, 0.01 to 10 times as written.
         loops : int or None

@@ -35,6 +35,7 @@ from cosmic.mico.api.trajectory_state import (
     PlayProgress,
     PlayState,
     StartMode,
+    present_mode,
 )
 from cosmic.mico.core.trajectory import parser
 from cosmic.mico.core.trajectory.binding import Bound
@@ -245,7 +246,7 @@ class TrajectoryPlayer(Declared):
         ----------
         start : str
             What to do where axes do not stand where the trajectory begins, or goes on: "refuse",
-            go there "straight" and together, or have a "way" found.
+            go there "straight" and together, or by a planned "detour".
 
         Raises
         ------
@@ -254,11 +255,11 @@ class TrajectoryPlayer(Declared):
         AwayFromStartError
             Axes stand elsewhere, and `start` is "refuse"; nothing moved.
         """
-        self.begin(start, one_line=False)
+        self.begin(present_mode(start), one_line=False)
 
     def step(self, start: StartMode = "refuse") -> None:
         """Carry out one line, then pause; raises as `resume`."""
-        self.begin(start, one_line=True)
+        self.begin(present_mode(start), one_line=True)
 
     @command(at_once=True)
     def pause(self) -> None:
@@ -321,6 +322,7 @@ class TrajectoryPlayer(Declared):
     @command(moves=True)
     def begin(self, start: StartMode = "refuse", *, one_line: bool = False) -> Task:
         """Begin, or go on, and return what ends with a pause, too; raises as `resume`."""
+        start = "detour" if start == "way" else start  # as an older client says it
         if start not in START_MODES:
             raise NotAvailable(f"start is one of {', '.join(START_MODES)}, not {start!r}")
         with self._changed:
@@ -328,7 +330,7 @@ class TrajectoryPlayer(Declared):
                 raise NotAvailable(f"{self.trajectory.name}: it is {self._state}")
             if start == "refuse":
                 self._run.refuse_away()
-            self._run.heed_stops()
+            self._run.watch_stops()
             task = self._site.worker.begin(self.trajectory.name, self._play)
             control = self._control
             control.pausing, control.one_line, control.start = False, one_line, start

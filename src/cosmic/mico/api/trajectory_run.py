@@ -74,7 +74,7 @@ class TrajectoryRun:
         wanted = self.start_positions.wanted(self.following, begun=self.begun)
         self.start_positions.refuse_away(wanted, begun=self.begun)
 
-    def heed_stops(self) -> None:
+    def watch_stops(self) -> None:
         """Have every stop from now on end what is played next."""
         self._epoch = self._site.manager.latch.state.epoch
 

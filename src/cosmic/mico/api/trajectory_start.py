@@ -67,9 +67,9 @@ class StartPositions:
         away = self.away(wanted, self._site.positions())
         if away:
             raise AwayFromStartError(
-                f"the axes do not stand where it {'goes on' if begun else 'begins'}: "
+                f"the axes are not where it {'goes on' if begun else 'begins'}: "
                 f"{', '.join(away)}; go there first, or run it with start='straight' or "
-                "start='way'",
+                "start='detour'",
                 wanted,
             )
 
@@ -79,7 +79,7 @@ class StartPositions:
         if away:
             raise AwayFromStartError(
                 f"it does not end where it begins ({', '.join(away)}), so it cannot be looped; "
-                "run it with start='straight' or start='way' to go back each time",
+                "run it with start='straight' or start='detour' to go back each time",
                 self.home(),
             )
 
@@ -96,14 +96,14 @@ class StartPositions:
             slack = _SLACK * (watch.tolerance_deg if unit == "deg" else watch.tolerance_um)
             position = stands.get(axis)
             if position is None or not abs(position - target) <= slack:
-                where = "somewhere" if position is None else format_quantity(position, unit)
+                where = "unknown" if position is None else format_quantity(position, unit)
                 words.append(f"{axis} at {where} instead of {format_quantity(target, unit)}")
         return words
 
     def waypoints(
         self, wanted: Mapping[str, float], mode: StartMode
     ) -> tuple[Mapping[str, float], ...]:
-        """Return the way to where the axes should stand; raises `MoveRefused`."""
+        """Return the path to where the axes should be; raises `MoveRefused`."""
         if mode == "straight" or self._site.worker.collision is None:
             return (wanted,)
         return self._site.worker.plan_path(wanted, PATH_BUDGET_S).waypoints

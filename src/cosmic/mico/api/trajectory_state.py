@@ -1,5 +1,6 @@
-"""What a trajectory player is at, as plain data, and what it has been told."""
+"""What a trajectory player is at, as plain data, and what is asked of it."""
 
+import warnings
 from dataclasses import dataclass
 from enum import StrEnum
 from threading import Condition, RLock
@@ -7,8 +8,18 @@ from typing import Final, Literal
 
 from cosmic.mico.core.trajectory.rehearsal import Rehearsal
 
-StartMode = Literal["refuse", "straight", "way"]
-START_MODES: Final = ("refuse", "straight", "way")
+StartMode = Literal["refuse", "straight", "detour", "way"]
+"""What to do where axes are not where a trajectory begins; "way" is the old name of "detour"."""
+START_MODES: Final = ("refuse", "straight", "detour")
+
+
+def present_mode(start: StartMode) -> StartMode:
+    """Return a mode by its present name, after a `DeprecationWarning` where it has another."""
+    if start != "way":
+        return start
+    text = "start='way' is now called start='detour'; the old name goes with the next version"
+    warnings.warn(text, DeprecationWarning, stacklevel=3)
+    return "detour"
 
 
 class PlayState(StrEnum):

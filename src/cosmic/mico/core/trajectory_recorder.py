@@ -159,7 +159,7 @@ class TrajectoryRecorder(WorkerThread):
         self._error: RecordingError | None = None
         self._lines = 0
         self._size = 0
-        self._under_way: set[str] = set()
+        self._running: set[str] = set()
         self._missed_before, self._missed = axes.missed, 0
         self._builder = SegmentBuilder(
             self._take,
@@ -233,9 +233,9 @@ class TrajectoryRecorder(WorkerThread):
         if isinstance(item, RecordedBegin):
             if self._sources is not None and item.event.source not in self._sources:
                 return
-            self._under_way.add(item.event.name)
+            self._running.add(item.event.name)
             self._queue.put(item)
-        elif item.name in self._under_way:
+        elif item.name in self._running:
             self._queue.put(item)
 
     # Its own thread

@@ -63,8 +63,8 @@ class AxisCommands(QObject):
         It ended; the text says why, and is empty at its target.
     consent_wanted(ConsentRequest)
         It was refused for an unknown position only.
-    way_wanted(DetourRequest)
-        Something stands in its way, and a way round may be looked for.
+    detour_requested(DetourRequest)
+        Something stands in its way, and a detour may be planned.
     noted(str)
         What to say of it meanwhile.
     """
@@ -85,12 +85,12 @@ class AxisCommands(QObject):
         self._series: StepwiseMove | None = None
         self._moved = False
         self._blocked: _Command | None = None
-        self.seeks_ways = False
-        """Have a way looked for where something stands in the way of a move to a goal."""
+        self.plans_detours = False
+        """Have a detour planned where something stands in the way of a move to a goal."""
 
     @property
     def series(self) -> StepwiseMove | None:
-        """The series of parts under way."""
+        """The series of parts that is moving."""
         series = self._series
         return series if series is not None and not series.done else None
 
@@ -101,9 +101,9 @@ class AxisCommands(QObject):
     def issue(
         self, what: str, make: Make, field: QWidget | None = None, *, goal: Goal | None = None
     ) -> None:
-        """Give a command; how it goes is told by the signals.
+        """Give a command; how it goes is published by the signals.
 
-        With a `goal`, a way round may be looked for where something stands in the way.
+        With a `goal`, a detour may be planned where something stands in the way.
         """
         self._issue(_Command(what, make, field, Movement(), consented=False, goal=goal))
 
@@ -130,7 +130,7 @@ class AxisCommands(QObject):
             self._series = None
 
     def follow(self, what: str, movement: Movement, *, why: Callable[[], str] = str) -> None:
-        """Tell how a movement ends that was begun elsewhere, such as a jog.
+        """Report how a movement ends that was begun elsewhere, such as a jog.
 
         `why` is asked when it ends without an error, or is cancelled; empty is a good end.
         """
@@ -157,7 +157,7 @@ class AxisCommands(QObject):
             self.ended.emit(command.why() if isinstance(error, MoveCancelled) else str(error))
             return
         reason = error.verdict.reason
-        if reason is Reason.COLLISION and command.goal is not None and self.seeks_ways:
+        if reason is Reason.COLLISION and command.goal is not None and self.plans_detours:
             self._want_detour(command, command.goal, error.verdict)
             return
         self.verdict_given.emit(error.verdict)

@@ -65,7 +65,7 @@ class AxisMenu(QObject):
         )
         self.menu.addSeparator()
         self.more = self._add(
-            "Show steps, parts and speed", "Move by steps or in parts, and set the speed", None
+            "Show steps and speed", "Move by steps or in several steps, and set the speed", None
         )
         self.more.setCheckable(True)
         self.more.toggled.connect(self.more_toggled)

@@ -28,7 +28,7 @@ _LOUD_PX: Final = 2.0
 _CALM: Final = (State.OK,)
 
 CONFIDENCE: Final[dict[Confidence, tuple[str, Tone, str]]] = {
-    Confidence.KNOWN: ("✓ known", "quiet", "The position was referenced: it is where it says"),
+    Confidence.KNOWN: ("✓ known", "quiet", "The position is referenced"),
     Confidence.ESTIMATED: ("≈ estimated", "quiet", "No sensor: the position is counted from steps"),
     Confidence.UNKNOWN: (
         "? unknown",

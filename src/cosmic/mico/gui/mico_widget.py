@@ -57,8 +57,8 @@ class MicoWidget(QWidget):
         A command of this panel was refused, or a jog stopped in front of something.
     undo_planned(object)
         The poses that Undo leads through, while it is asked about or under way; None afterwards.
-    way_wanted(DetourRequest)
-        Something stands in the way of a move, while ways round are sought.
+    detour_requested(DetourRequest)
+        Something stands in the way of a move, while detours are planned.
     """
 
     failure_changed = Signal(str)
@@ -76,7 +76,7 @@ class MicoWidget(QWidget):
         self._shape: list[tuple[str, str]] = []
         self._dialog: ConsentDialog | None = None
         self._caution: CautionDialog | None = None
-        self._seeks_ways = False
+        self._plans_detours = False
         self._stopped: str | None = None
         self._collision = CollisionStatus(mico)
         self._outline: tuple[object, ...] = ()
@@ -211,11 +211,11 @@ class MicoWidget(QWidget):
         for card in self._cards.values():
             card.show_stopped(reason)
 
-    def set_seeking_ways(self, on: bool) -> None:
+    def set_planning_detours(self, on: bool) -> None:
         """Ask with `detour_wanted` instead of refusing a move that something blocks."""
-        self._seeks_ways = on
+        self._plans_detours = on
         for card in self._cards.values():
-            card.commands.seeks_ways = on
+            card.commands.plans_detours = on
 
     # What there is
 
@@ -265,7 +265,7 @@ class MicoWidget(QWidget):
             card.consent_wanted.connect(self._on_consent_wanted)
             card.commands.verdict_given.connect(self.verdict_given)
             card.commands.detour_wanted.connect(self.detour_wanted)
-            card.commands.seeks_ways = self._seeks_ways
+            card.commands.plans_detours = self._plans_detours
             card.show_stopped(self._stopped)
             if isinstance(card, ClosedLoopGUI):
                 join_links(card, self._mico)

@@ -54,10 +54,10 @@ class MoveFields:
             push_button("Go to", f"Move {axis.name} to the position in the field beside"),
             "MiCoCL_9",
         )
-        self.split = named(QCheckBox("in parts of"), "MiCoCL_10")
+        self.split = named(QCheckBox("in steps of"), "MiCoCL_10")
         tipped(self.split, "Make each move as a series of moves of at most this size")
         self.largest = named(
-            QuantityField(unit, low=smallest, value=usual, name="Largest part of a move"),
+            QuantityField(unit, low=smallest, value=usual, name="Largest step of a move"),
             "MiCoCL_11",
         )
         self.split.toggled.connect(self.largest.setEnabled)
@@ -86,7 +86,7 @@ class MoveFields:
         return all(accepted)
 
     def move_by(self, direction: int, *, consent: bool) -> Movement | StepwiseMove:
-        """Move by the step size in `direction`, 1 or -1, at once or in parts."""
+        """Move by the step size in `direction`, 1 or -1, at once or in steps."""
         distance_typed = direction * self.distance.value()
         if self.split.isChecked():
             return StepwiseMove.by(
@@ -95,7 +95,7 @@ class MoveFields:
         return self._axis.move_by(distance_typed, wait=False, consent=consent)
 
     def move_to(self, *, consent: bool) -> Movement | StepwiseMove:
-        """Move to the position, at once or in parts."""
+        """Move to the position, at once or in steps."""
         target = self.target.value()
         if self.split.isChecked():
             return StepwiseMove(self._axis, target, self.largest.value(), consent=consent)

@@ -39,7 +39,7 @@ class PosesBox(QWidget):
         self.poses = named(tipped(QComboBox(), "Named poses"), "poses")
         self.go = named(push_button("Go", "Move all axes of the pose there, together"), "goPose")
         self.around = named(
-            push_button("Go round", "Plan a path around obstacles and follow it"), "goPoseWay"
+            push_button("Plan a path", "Plan a path around obstacles and follow it"), "goPoseDetour"
         )
         self.remove = named(push_button("Remove", "Forget this pose"), "removePose")
         self.name = named(tipped(QLineEdit(), "Name of the pose to teach"), "poseName")
@@ -122,7 +122,7 @@ class PosesBox(QWidget):
     def _go(self, *, around: bool) -> None:
         """Begin to go; how it ends is shown by the window's task bar."""
         try:
-            task = self._mico.poses.go(self.poses.currentText(), way=around, wait=False)
+            task = self._mico.poses.go(self.poses.currentText(), detour=around, wait=False)
         except CosmicError as exc:
             self.message.set_text(str(exc))
             return

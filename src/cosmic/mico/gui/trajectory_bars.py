@@ -105,7 +105,7 @@ class StartQuestion(QWidget):
     Signals
     -------
     chosen(str)
-        "straight" or "way".
+        "straight" or "detour".
     """
 
     chosen = Signal(str)
@@ -118,7 +118,7 @@ class StartQuestion(QWidget):
         self.straight = named(
             push_button("Go there straight", "All axes together; the gate decides"), "goStraight"
         )
-        self.around = named(push_button("Plan a path", "Plan a path around obstacles"), "goWay")
+        self.around = named(push_button("Plan a path", "Plan a path around obstacles"), "goDetour")
         self.leave = named(push_button("Leave it", "Nothing moves"), "leaveStart")
         row, beside = tight_row(STEP_PX)
         beside.addStretch(1)
@@ -130,7 +130,7 @@ class StartQuestion(QWidget):
         column.addWidget(self.words)
         column.addWidget(row)
         self.straight.clicked.connect(lambda: self._choose("straight"))
-        self.around.clicked.connect(lambda: self._choose("way"))
+        self.around.clicked.connect(lambda: self._choose("detour"))
         self.leave.clicked.connect(self.hide)
         self.hide()
 

@@ -116,7 +116,7 @@ class PlayControl(QObject):
             self.refused.emit(str(error))
 
     def _on_start_chosen(self, mode: str) -> None:
-        self._try_start("way" if mode == "way" else "straight")
+        self._try_start("detour" if mode == "detour" else "straight")
 
     def _on_pause(self) -> None:
         if self._player is not None:

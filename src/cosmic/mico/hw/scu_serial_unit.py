@@ -107,7 +107,7 @@ class Unit:
     _urgent: deque[Line] = field(default_factory=deque)
     _commands: deque[Line] = field(default_factory=deque)
     _questions: deque[Line] = field(default_factory=deque)
-    _under_way: deque[Line] = field(default_factory=deque)
+    _unanswered: deque[Line] = field(default_factory=deque)
     _events: deque[Event] = field(default_factory=deque)
     _free: Lock = field(default_factory=Lock)
     _sent: int = 0
@@ -151,7 +151,7 @@ class Unit:
                 self._free.release()
 
     def _has_work(self) -> bool:
-        waiting = bool(self._commands or self._questions) and not self._under_way
+        waiting = bool(self._commands or self._questions) and not self._unanswered
         return self._gone is None and (bool(self._urgent) or waiting)
 
     def _sendable(self) -> Iterator[Line]:
@@ -162,9 +162,9 @@ class Unit:
                 logger.info("%s: %s was not sent: a stop came first", self.name, each.said)
                 self._commands.remove(each)
             yield stop
-        if not self._under_way and self._commands:
+        if not self._unanswered and self._commands:
             yield self._commands.popleft()
-        while not self._under_way and self._questions:
+        while not self._unanswered and self._questions:
             line = self._questions.popleft()
             known = self._known.get((line.at.channel, line.said))
             if known is not None and known[0] > line.asked:
@@ -179,7 +179,7 @@ class Unit:
             self._forget(line.at)
         self._sent += 1
         line.number = self._sent
-        self._under_way.append(line)
+        self._unanswered.append(line)
         if self.echoes:
             self._echo.append(line.said)
         try:
@@ -260,14 +260,14 @@ class Unit:
         if event is not None:
             self._events.append(event)
             return
-        if not self._under_way:
+        if not self._unanswered:
             logger.warning("%s: nobody asked for %r", self.name, said)
             return
-        line = self._under_way[0]
+        line = self._unanswered[0]
         if not self._fits(line, said):
             logger.warning("%s: %r is no answer to %s", self.name, said, line.said)
             return
-        self._under_way.popleft()
+        self._unanswered.popleft()
         self._missed = 0
         if text.error_code(said) in text.GARBLED and line.tries < MOST_TRIES:
             logger.warning("%s: %s was not understood and is sent again", self.name, line.said)
@@ -302,13 +302,13 @@ class Unit:
 
     def _look_at_clock(self) -> None:
         """Give up waiting for an answer that does not come."""
-        if not self._under_way:
+        if not self._unanswered:
             return
-        line = self._under_way[0]
+        line = self._unanswered[0]
         waited_s = WALL.now_s() - line.sent_s
         if waited_s <= self.answer_s:
             return
-        self._under_way.popleft()
+        self._unanswered.popleft()
         self._missed += 1
         here = where(self.index, line.at.channel, serial=self.serial)
         said = f"{here}: {line.said} was not answered within {self.answer_s:g} s"
@@ -326,7 +326,7 @@ class Unit:
     def _keep_alive(self) -> None:
         """Say that this program still lives, where it has been silent for a while."""
         quiet_s = WALL.now_s() - self._spoke_s
-        if self.keep_alive_s > 0.0 and quiet_s > self.keep_alive_s / 3.0 and not self._under_way:
+        if self.keep_alive_s > 0.0 and quiet_s > self.keep_alive_s / 3.0 and not self._unanswered:
             whole = Channel(self.index, text.WHOLE_UNIT)
             self._commands.append(Line("K", whole, optional=True))
 

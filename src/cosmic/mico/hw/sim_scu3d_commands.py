@@ -58,7 +58,7 @@ def position_absolute(channel: Channel, now_s: float, position: int, hold: int) 
 def position_relative(channel: Channel, now_s: float, diff: int, hold: int) -> Values:
     """Go by a distance from where it is now, 0.1 um, and hold, ms."""
     _require_linear(channel)
-    moves.drive(channel, now_s, channel.stage.position(now_s) + channel.scale.way(diff), hold)
+    moves.drive(channel, now_s, channel.stage.position(now_s) + channel.scale.distance(diff), hold)
     return ()
 
 
@@ -76,7 +76,7 @@ def angle_relative(
 ) -> Values:
     """Go by an angle from where it is now, 0.1 mdeg, and hold, ms."""
     _require_rotary(channel)
-    moves.drive(channel, now_s, channel.stage.position(now_s) + channel.scale.way(diff), hold)
+    moves.drive(channel, now_s, channel.stage.position(now_s) + channel.scale.distance(diff), hold)
     return ()
 
 

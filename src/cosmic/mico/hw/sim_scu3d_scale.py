@@ -55,7 +55,7 @@ class CountScale:
         """Return the true position at which the controller would show `counts`."""
         return self._sign * (counts / self._per_unit - self._shift)
 
-    def way(self, counts: int) -> float:
+    def distance(self, counts: int) -> float:
         """Return the true way that `counts` mean."""
         return self._sign * counts / self._per_unit
 

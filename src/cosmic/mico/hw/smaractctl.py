@@ -374,9 +374,9 @@ class SmaractCtlController(Controller):
 
     @override
     def move_to_end_stop(self, channel: Channel, direction: Direction, *, hold_s: float) -> None:
-        way = -_FAR if direction is Direction.BACKWARD else _FAR
+        far = -_FAR if direction is Direction.BACKWARD else _FAR
         mode = sa.SA_CTL_MOVE_MODE_CL_RELATIVE
-        self._closed_loop(channel, mode, way, hold_s, seeks_end=True)
+        self._closed_loop(channel, mode, far, hold_s, seeks_end=True)
 
     @override
     def move_together(self, moves: Sequence[MatchedMove]) -> None:

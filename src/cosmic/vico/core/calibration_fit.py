@@ -231,7 +231,7 @@ def _inliers(
 ) -> npt.NDArray[np.bool_]:
     """Return which sightings agree with most of the others (least median of squares)."""
     best_px, kept = math.inf, np.ones(len(points), dtype=np.bool_)
-    for straight in _straight_ways(seen, axis_px):
+    for straight in _straight_fits(seen, axis_px):
         for triple in _triples(len(points)):
             corners = np.column_stack([points[triple], np.ones(3)])
             if abs(np.linalg.det(corners)) < 1e-6 * max(1.0, float(np.ptp(points)) ** 2):
@@ -253,7 +253,7 @@ def _inliers(
     return kept
 
 
-def _straight_ways(seen: Floats, axis_px: Pair | None) -> list[Floats]:
+def _straight_fits(seen: Floats, axis_px: Pair | None) -> list[Floats]:
     """Return what was seen, put straight for lenses that bend by different amounts."""
     if axis_px is None:
         return [seen]

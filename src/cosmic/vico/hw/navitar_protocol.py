@@ -372,13 +372,13 @@ def probe(port: SerialPort) -> Found:
         The port is gone; it is closed then.
     """
     answers: list[str] = []
-    ways: tuple[tuple[int, Registers], ...] = (
+    dialects: tuple[tuple[int, Registers], ...] = (
         (1, FrameRegisters(port, tries=1)),
         (2, AsciiRegisters(port, tries=2)),
         (1, FrameRegisters(port, tries=2)),
     )
     try:
-        for generation, registers in ways:
+        for generation, registers in dialects:
             try:
                 product = registers.read(Register.PRODUCT)
             except (DeviceTimeout, ProtocolError) as exc:

@@ -405,8 +405,8 @@ class SimulatedCamera(BaseCamera):
         late_s = SLOW_S if self._faults.hit("slow", self._info.key) else 0.0
         settings = exposure.settings
         transfer_s = self._optics.settings.camera.transfer_s
-        way_s = settings.exposure_s + self._readout_s(settings.roi) + transfer_s
-        return exposure.exposed_s + way_s + late_s
+        transit_s = settings.exposure_s + self._readout_s(settings.roi) + transfer_s
+        return exposure.exposed_s + transit_s + late_s
 
     def _busy_s(self, settings: CameraSettings) -> float:
         return max(settings.exposure_s, self._readout_s(settings.roi))

@@ -259,7 +259,7 @@ def test_a_saturated_sensor_is_reported() -> None:
 def test_a_force_that_follows_no_beam_is_a_poor_fit() -> None:
     spans = []
     for span in pushed(rig()):
-        way = np.maximum(span.way_um - 100.0, 0.0)
+        way = np.maximum(span.probe_um - 100.0, 0.0)
         spans.append(dataclasses.replace(span, force_un=0.4 + 40.0 * (way / way.max()) ** 3))
     found = fit_bending(spans)
     assert all(Quality.POOR_FIT in fit.flags for fit in found.spans)
@@ -296,7 +296,7 @@ def test_points_that_are_no_numbers_are_left_out() -> None:
 
 def part(span: Span, kept: np.ndarray) -> Span:
     """Return some points of a span."""
-    columns = ("way_um", "force_un", "force_std_un", "time_s", "loading")
+    columns = ("probe_um", "force_un", "force_std_un", "time_s", "loading")
     return dataclasses.replace(span, **{name: getattr(span, name)[kept] for name in columns})
 
 

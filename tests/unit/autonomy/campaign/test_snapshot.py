@@ -72,8 +72,8 @@ def test_a_card_has_curves_from_the_first_contact_without_their_baseline() -> No
     assert record.bending is not None
     assert len(card.curves) == len(record.spans)
     for curve, span in zip(card.curves, record.spans, strict=True):
-        assert curve.way_um.shape == curve.force_un.shape == curve.fitted_un.shape
-        before = curve.force_un[curve.way_um < -0.5]
+        assert curve.probe_um.shape == curve.force_un.shape == curve.fitted_un.shape
+        before = curve.force_un[curve.probe_um < -0.5]
         assert np.abs(before).max() < 3.0, "the baseline is taken out"
         assert curve.force_un.max() > 20.0
         fitted = np.isfinite(curve.fitted_un)
@@ -90,7 +90,7 @@ def test_a_span_that_was_not_fitted_is_shown_all_the_same() -> None:
     assert card.ei is None
     assert len(card.curves) == len(good(1).spans)
     for curve in card.curves:
-        assert curve.way_um.min() == 0.0
+        assert curve.probe_um.min() == 0.0
         assert np.isnan(curve.fitted_un).all()
         assert not curve.used
 
@@ -109,11 +109,11 @@ def test_a_curve_that_was_sampled_finely_is_thinned_out() -> None:
     way = np.linspace(0.0, 30.0, many)
     fine = replace(
         span,
-        way_um=way,
+        probe_um=way,
         force_un=way.copy(),
         force_std_un=np.ones(many),
         time_s=way.copy(),
         loading=np.ones(many, dtype=bool),
     )
     card = card_of(replace(record, spans=(fine,), bending=None))
-    assert card.curves[0].way_um.size <= 2000
+    assert card.curves[0].probe_um.size <= 2000

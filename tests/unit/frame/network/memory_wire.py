@@ -47,7 +47,7 @@ class MemoryInlet(Backlog[bytes]):
             self._inlets.remove(self)
 
 
-class MemorySign:
+class MemoryToken:
     def __init__(self, take_away: Callable[[], None]) -> None:
         self.close = take_away
 
@@ -62,7 +62,7 @@ class MemoryHub:
         self.asked: dict[str, Backlog[MemoryQuestion]] = {}
         self.inlets: dict[str, list[Backlog[bytes]]] = {}
         self.watchers: dict[str, list[Backlog[tuple[str, bool]]]] = {}
-        self.signs: set[str] = set()
+        self.tokens: set[str] = set()
         self.tamper: Callable[[MemoryQuestion], list[MemoryQuestion]] = lambda each: [each]
 
     def find(self, key: str) -> Backlog[MemoryQuestion] | None:
@@ -108,20 +108,20 @@ class MemoryWire:
         self._inboxes.append(made)
         return made
 
-    def sign(self, key: str) -> MemorySign:
-        self._hub.signs.add(key)
+    def liveliness(self, key: str) -> MemoryToken:
+        self._hub.tokens.add(key)
 
         def take_away() -> None:
-            if key in self._hub.signs:
-                self._hub.signs.discard(key)
+            if key in self._hub.tokens:
+                self._hub.tokens.discard(key)
                 for keys, inboxes in self._hub.watchers.items():
                     if key.startswith(keys.removesuffix("**")):
                         for each in inboxes:
                             each.put((key, False))
 
-        return MemorySign(take_away)
+        return MemoryToken(take_away)
 
-    def signs(self, keys: str) -> Inbox[tuple[str, bool]]:
+    def watch_liveliness(self, keys: str) -> Inbox[tuple[str, bool]]:
         made: Backlog[tuple[str, bool]] = self._inbox()
         self._hub.watchers.setdefault(keys, []).append(made)
         return made

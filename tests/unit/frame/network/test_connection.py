@@ -115,12 +115,12 @@ def test_a_client_knows_whether_it_holds_the_lease(bench: Bench) -> None:
     assert not bench.client.holds_lease
     bench.client.take_lease()
     assert bench.client.holds_lease
-    assert not wait_until(lambda: not bench.client.holds_lease, 0.3), "signs of life keep it"
+    assert not wait_until(lambda: not bench.client.holds_lease, 0.3), "heartbeats keep it"
     bench.client.release_lease()
     assert not bench.client.holds_lease
     bench.client.take_lease()
     bench.station.lease.take_over()
-    assert wait_until(lambda: not bench.client.holds_lease), "the next sign of life tells"
+    assert wait_until(lambda: not bench.client.holds_lease), "the next heartbeat tells"
 
 
 def test_signs_of_life_that_come_late_do_not_keep_a_motion_alive(bench: Bench) -> None:

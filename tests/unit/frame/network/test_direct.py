@@ -18,7 +18,7 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network import server_listener
-from cosmic.frame.network.addresses import asks, client_signs, greetings
+from cosmic.frame.network.addresses import asks, client_liveliness, greetings
 from cosmic.frame.network.certificates import make_certificates
 from cosmic.frame.network.client_side_connection import ClientSideConnection
 from cosmic.frame.network.codec import encode
@@ -196,7 +196,7 @@ def test_without_direct_lines_calls_go_over_the_engine(
     line = Line(f"tcp/127.0.0.1:{free_port()}", True, "fibres")
     with listening(station, line), connected(line.endpoint) as client:
         assert client.call("stage", "thread") == "fibres calls stage"
-    assert "calls go the slower way: a wall" in caplog.text
+    assert "calls use the slower connection: a wall" in caplog.text
 
 
 # --- when they break
@@ -251,12 +251,12 @@ def test_a_call_in_progress_does_not_hold_up_the_end_of_its_session(
     served: Served, wire: ZenohWire, attached: Attach
 ) -> None:
     rude = Session(wire)
-    sign = wire.sign(client_signs("fibres", rude.key))
+    liveliness = wire.liveliness(client_liveliness("fibres", rude.key))
     calls, _ = attached(rude.port, rude.key, rude.token, False)
     calls.send(rude.request("call", "wait_here"))
     assert served.stage.entered.wait(5.0)
     assert wait_until(lambda: served.listener.clients == [rude.key])
-    sign.close()
+    liveliness.close()
     assert wait_until(lambda: served.listener.clients == [], 1.0), "the listener goes on"
     with connected(served.endpoint) as client:
         client.call("stage", "stop")

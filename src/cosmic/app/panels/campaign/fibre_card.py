@@ -163,8 +163,10 @@ class FibreCurves(CurveFrame):
             back = ~curve.loading
             for branch in (curve.loading, back):
                 fitted = branch & np.isfinite(curve.fitted_un)
-                order = np.argsort(curve.way_um[fitted])
-                line = pg.PlotCurveItem(curve.way_um[fitted][order], curve.fitted_un[fitted][order])
+                order = np.argsort(curve.probe_um[fitted])
+                line = pg.PlotCurveItem(
+                    curve.probe_um[fitted][order], curve.fitted_un[fitted][order]
+                )
                 line.setPen(pg.mkPen(palette.dim, width=1))
                 self.box.addItem(line)
             self.box.addItem(_points(curve, back, _BACK, hollow=True))
@@ -174,11 +176,11 @@ class FibreCurves(CurveFrame):
             self.box.autoRange(padding=0.12)
 
     def _label(self, curve: SpanCurve, colour: str) -> None:
-        last = int(np.argmax(curve.way_um))
+        last = int(np.argmax(curve.probe_um))
         text = f"{curve.place_um:.0f} µm" + ("" if curve.used else ", not used")
         label = pg.TextItem(text, color=colour, anchor=(1.0, 1.0))
         label.setFont(number_font(11))
-        label.setPos(float(curve.way_um[last]), float(curve.force_un[last]))
+        label.setPos(float(curve.probe_um[last]), float(curve.force_un[last]))
         self.labels.append(label)
         self.box.addItem(label, ignoreBounds=True)
 
@@ -189,7 +191,7 @@ class FibreCurves(CurveFrame):
 
 def _points(curve: SpanCurve, which: Mask, colour: str, *, hollow: bool) -> pg.ScatterPlotItem:
     return pg.ScatterPlotItem(
-        curve.way_um[which],
+        curve.probe_um[which],
         curve.force_un[which],
         size=_POINT_PX,
         pen=pg.mkPen(colour, width=1.2) if hollow else pg.mkPen(None),

@@ -57,7 +57,7 @@ class Arrangement:
         ]
         rotations = [np.ascontiguousarray(pose[:3, :3]) for pose in self._start]
         sliding = self.chains & ~self.turning
-        shifts = sliding[:, np.newaxis, :] * self.ways.T[np.newaxis, :, :]
+        shifts = sliding[:, np.newaxis, :] * self.slide_axes.T[np.newaxis, :, :]
         self._zero = Turned(rotations, self._start[:, :3, 3].copy(), np.asarray(shifts))
         self._last = (np.zeros(self._turning_joints.size).tobytes(), self._zero)
 
@@ -82,13 +82,13 @@ class Arrangement:
         return np.asarray(~(self.chains & self.turning).any(axis=1))
 
     @cached_property
-    def ways(self) -> Floats:
+    def slide_axes(self) -> Floats:
         """World direction of every joint at value 0, shape (joints, 3); zero for fixed ones."""
-        ways = np.zeros((len(self.model.joints), 3))
+        slide_axes = np.zeros((len(self.model.joints), 3))
         for number, joint in enumerate(self.model.joints):
             if joint.kind is not JointKind.FIXED:
-                ways[number] = self._start[self.child[number]][:3, :3] @ joint.axis
-        return ways
+                slide_axes[number] = self._start[self.child[number]][:3, :3] @ joint.axis
+        return slide_axes
 
     @cached_property
     def steady(self) -> Flags:

@@ -261,7 +261,7 @@ class Sweep:
         """
         least = begin.gaps[begin.nearest]
         overlapping = [row for row, gap in begin.gaps.items() if not gap > 0.0]
-        normal = self._way_out(overlapping, begin.rows, onward.origin) if overlapping else None
+        normal = self._exit(overlapping, begin.rows, onward.origin) if overlapping else None
         stand = self._stand(onward.centre)
         for row in begin.rows:
             used = np.flatnonzero(self._between[row] & (onward.half > 0.0))
@@ -311,7 +311,7 @@ class Sweep:
             return self._turning.parts(self._turn(row), onward, normal)
         return leaves(self._slide(row, onward, stand, used), normal, strictly=True)
 
-    def _way_out(self, overlapping: list[int], rows: list[int], values: Floats) -> Floats | None:
+    def _exit(self, overlapping: list[int], rows: list[int], values: Floats) -> Floats | None:
         """Return the direction in which the second body is out of the first after least way.
 
         Only directions count in which the two can be moved against each other, and that do not

@@ -212,8 +212,8 @@ class Gate:
             state = snapshot.states[axis]
             if state.confidence is Confidence.UNKNOWN:
                 self._regions[axis] = interval  # wherever that ends, it is somewhere there
-            way = decision.headings.get(axis)
-            hold = _Hold(reservation, interval, target, origin(state, snapshot.begun_at), way)
+            heading = decision.headings.get(axis)
+            hold = _Hold(reservation, interval, target, origin(state, snapshot.begun_at), heading)
             self._holds.setdefault(axis, {})[reservation.number] = hold
             self._given = reservation.number
             self._unused[id(reservation)] = _Unused(reservation, asked[axis])

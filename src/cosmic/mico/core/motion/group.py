@@ -19,7 +19,7 @@ from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import FREQUENCY_HZ, Motion, Reservation
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState, class_for
-from cosmic.mico.core.motion.straight import StraightLine, Way
+from cosmic.mico.core.motion.straight import AxisTravel, StraightLine
 from cosmic.mico.core.settings import MicoSettings, MotionDefaults
 from cosmic.mico.hw.interface import Capabilities, Channel, Controller, MatchedMove
 
@@ -69,7 +69,7 @@ def matched_frequencies(legs: Mapping[str, Leg]) -> dict[str, int]:
     }
 
 
-NO_WAY: Final = 1e-3
+AT_REST: Final = 1e-3
 """A shorter way, in um or degrees, is none."""
 
 
@@ -96,7 +96,7 @@ def straight_line(
         None where fewer than two axes have a way to go.
     """
     lengths = {name: target - (states[name].position or 0.0) for name, target in targets.items()}
-    going = {name: abs(distance) for name, distance in lengths.items() if abs(distance) >= NO_WAY}
+    going = {name: abs(distance) for name, distance in lengths.items() if abs(distance) >= AT_REST}
     if len(going) < 2:
         return None
     duration_s = max(distance / speeds[name] for name, distance in going.items())
@@ -104,7 +104,7 @@ def straight_line(
         defaults.acceleration(states[name].unit) / distance for name, distance in going.items()
     )
     errors = {name: defaults.following_error(states[name].unit) for name in going}
-    ways: dict[str, Way] = {}
+    travels: dict[str, AxisTravel] = {}
     for name, distance in going.items():
         state, speed = states[name], distance / duration_s
         others = [other for other in going if other != name]
@@ -121,8 +121,8 @@ def straight_line(
         )
         start = targets[name] - lengths[name]
         wide = lag + speed * spread_s
-        ways[name] = Way(start, targets[name], move, beside=beside, lag=lag, wide=wide)
-    return StraightLine(ways)
+        travels[name] = AxisTravel(start, targets[name], move, beside=beside, lag=lag, wide=wide)
+    return StraightLine(travels)
 
 
 def runs_straight(state: PositionerState, can: Capabilities) -> bool:

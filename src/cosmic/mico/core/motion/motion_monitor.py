@@ -65,7 +65,7 @@ class ActiveMove:
     reported : bool
         Its movement has been failed already; the axis is only followed until it is stationary.
     progress_s : float
-        Platform time of the last sign of life.
+        Platform time of the last heartbeat.
     progress_position : float or None
         Where it was then.
     """
@@ -116,12 +116,12 @@ class ActiveMove:
         return self.rests_seen >= 2
 
     def note_position(self, position: float | None, now_s: float) -> None:
-        """Take a new position as a sign of life, the same one as none."""
+        """Take a new position as a heartbeat, the same one as none."""
         if position != self.progress_position:
             self.progress_position, self.progress_s = position, now_s
 
     def stall_s(self, settings: MicoSettings, rate: float) -> float:
-        """Return how long it may go on without a sign of life, in platform seconds.
+        """Return how long it may go on without a heartbeat, in platform seconds.
 
         A fast clock must not turn the jitter of the wall into a time-out.
         """

@@ -21,7 +21,7 @@ MOST_CHECKS: Final = 256
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class AxisTravel:
     """One axis' part of a line, in its unit.
 
     Attributes
@@ -59,12 +59,12 @@ class Way:
 class StraightLine:
     """The ways of all axes of a group, by name; those without one stay where they are."""
 
-    ways: Mapping[str, Way]
+    travels: Mapping[str, AxisTravel]
 
     @property
     def moves(self) -> tuple[MatchedMove, ...]:
         """What the controller is told."""
-        return tuple(way.move for way in self.ways.values())
+        return tuple(own.move for own in self.travels.values())
 
     def part(self, box: Spans, first: float, last: float) -> Spans:
         """Return where all axes may be between two shares of the line.
@@ -75,10 +75,10 @@ class StraightLine:
             The same for the whole movement with its axes in any order.
         """
         spans = dict(box)
-        for name, way in self.ways.items():
+        for name, own in self.travels.items():
             span = box[name]
-            ends = way.start + first * way.length, way.start + last * way.length
-            low, high = min(ends) - way.wide, max(ends) + way.wide
+            ends = own.start + first * own.length, own.start + last * own.length
+            low, high = min(ends) - own.wide, max(ends) + own.wide
             # Only at its beginning is it known where everything stands.
             known = span if first == 0.0 else replace(span, now=None, heading=None)
             spans[name] = replace(known, low=_inside(low, span), high=_inside(high, span))
@@ -86,8 +86,8 @@ class StraightLine:
 
     def fine(self, first: float, last: float) -> bool:
         """Return whether a part is so short that its halves would say no more."""
-        ways = self.ways.values()
-        return all(abs(way.length) * (last - first) <= FINE * way.wide for way in ways)
+        travels = self.travels.values()
+        return all(abs(own.length) * (last - first) <= FINE * own.wide for own in travels)
 
 
 def _inside(end: float, span: AxisSpan) -> float:
@@ -138,17 +138,17 @@ class LineWatch:
 
     def lags(self, name: str, position: float) -> str | None:
         """Take a position that was just read; return why the line is left, or None."""
-        way = self._line.ways.get(name)
-        if way is None:
+        own = self._line.travels.get(name)
+        if own is None:
             return None
-        share = way.share(position)
+        share = own.share(position)
         with self._lock:
             self._shares[name] = max(share, self._shares.get(name, 0.0))
-            beside = self._shares.get(way.beside, share)
-        behind = (beside - share) * abs(way.length)
-        if behind <= way.lag:
+            beside = self._shares.get(own.beside, share)
+        behind = (beside - share) * abs(own.length)
+        if behind <= own.lag:
             return None
-        unit = way.move.unit
+        unit = own.move.unit
         return (
-            f"{name}: it is {format_quantity(behind, unit)} behind {way.beside}; both are stopped"
+            f"{name}: it is {format_quantity(behind, unit)} behind {own.beside}; both are stopped"
         )

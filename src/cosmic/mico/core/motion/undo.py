@@ -316,7 +316,7 @@ class UndoHistory(QObject):
 
         What was come to carefully must not be left, or come back to, at travel speed.
         """
-        motions = {name: self._way_back(name, where) for name, where in entry.before.items()}
+        motions = {name: self._return_motion(name, where) for name, where in entry.before.items()}
         slow_hz = {
             name: self._slow_hz(name, motion.unit)
             for name, motion in motions.items()
@@ -333,7 +333,7 @@ class UndoHistory(QObject):
         low, high = self._manager.state(name).frequency_range_hz
         return max(low, min(high, math.ceil(hertz)))
 
-    def _way_back(self, name: str, where: float) -> Motion:
+    def _return_motion(self, name: str, where: float) -> Motion:
         state = self._manager.state(name)
         if state.kind is not PositionerKind.OPEN_LOOP:
             return MoveTo(where, state.unit)

@@ -45,7 +45,7 @@ def no_path(boxes: Boxes, here: Point, there: Point) -> NoPath:
     why = "no path found in the time given" if late else "no path found"
     return NoPath(
         f"{why}: straight on, {_gap(touch)}; most often blocking: {blocking or 'nothing'}; "
-        "move one of them aside first, or go there by hand in parts",
+        "move one of them aside first, or go there by hand in several steps",
         touch,
         boxes.space.named(reached) if reached != here else {},
     )

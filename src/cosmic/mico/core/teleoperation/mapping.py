@@ -27,7 +27,7 @@ class Converter(Protocol):
         """Return the wanted velocity of each positioner, in its unit per second or Hz."""
 
 
-class Places(Protocol):
+class PositionOf(Protocol):
     """Says where a positioner is, in gate coordinates; None while nobody knows."""
 
     @abstractmethod
@@ -50,7 +50,7 @@ class ProfileMapping(Converter):
     ----------
     usual : mapping of float
         Speed limit of each positioner that the profile gives none.
-    places : callable
+    position_of : callable
         Where a positioner is, for those that follow a position.
     """
 
@@ -58,7 +58,7 @@ class ProfileMapping(Converter):
         self,
         profile: TeleoperationProfileSettings,
         usual: Mapping[str, float],
-        places: Places,
+        position_of: PositionOf,
     ) -> None:
         self._profile = profile
         self._limits: dict[str, float] = {}
@@ -66,7 +66,7 @@ class ProfileMapping(Converter):
             limit = each.speed or usual[each.positioner]
             self._limits[each.positioner] = max(limit, self._limits.get(each.positioner, 0.0))
         self._usual = usual
-        self._places = places
+        self._position_of = position_of
         self._origins: dict[str, float] = {}
 
     @property
@@ -110,7 +110,7 @@ class ProfileMapping(Converter):
 
     def _follow(self, each: TeleoperationAxisSettings, inputs: InputState, share: float) -> float:
         """Return the velocity that takes a positioner to where the device is, from its origin."""
-        place, travel = self._places(each.positioner), each.travel or 0.0
+        place, travel = self._position_of(each.positioner), each.travel or 0.0
         part = self._part(each, inputs)
         if place is None:
             return 0.0

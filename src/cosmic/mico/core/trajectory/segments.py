@@ -30,7 +30,7 @@ class _Part:
     unit: AxisUnit
     sensed: bool
     frequency_hz: int | None
-    under_way: bool = True
+    moving: bool = True
     broken_off: bool = False
     end: float | None = None
     ended_s: float = 0.0
@@ -115,10 +115,10 @@ class SegmentBuilder:
         known = self._parts.get(event.name)
         if known is not None and self._goes_on(known, event, positions):
             known.begun = event
-            known.under_way, known.broken_off, known.end = True, False, None
+            known.moving, known.broken_off, known.end = True, False, None
             return
         if known is not None or any(
-            not each.under_way or each.moved(positions, now_s) for each in self._parts.values()
+            not each.moving or each.moved(positions, now_s) for each in self._parts.values()
         ):
             self._cut(positions, now_s, but=event.name)
         if not self._parts:
@@ -133,9 +133,9 @@ class SegmentBuilder:
     def ended(self, name: str, positions: Positions, now_s: float, *, well: bool) -> None:
         """Take the end of a movement."""
         part = self._parts.get(name)
-        if part is None or not part.under_way:
+        if part is None or not part.moving:
             return
-        part.under_way, part.broken_off, part.ended_s = False, not well, now_s
+        part.moving, part.broken_off, part.ended_s = False, not well, now_s
         target = part.begun.target
         exact = well and target is not None and not isinstance(part.begun.motion, Jog)
         part.end = target if exact else positions.get(name, part.start)
@@ -145,7 +145,7 @@ class SegmentBuilder:
     def idle(self, now_s: float) -> None:
         """Write what is over; call it now and then while nothing happens."""
         parts = self._parts.values()
-        if not parts or any(each.under_way for each in parts):
+        if not parts or any(each.moving for each in parts):
             return
         if now_s - max(each.ended_s for each in parts) > REPLACED_S:
             self._cut({}, now_s, but="")
@@ -158,7 +158,7 @@ class SegmentBuilder:
     def _settle(self, positions: Positions, now_s: float, resting: Collection[str]) -> None:
         """Take the ends of movements that nobody has told yet."""
         for name, part in self._parts.items():
-            if part.under_way and name in resting:
+            if part.moving and name in resting:
                 target, here = part.begun.target, positions.get(name)
                 missed = (
                     target is not None
@@ -175,7 +175,7 @@ class SegmentBuilder:
 
     def _goes_on(self, part: _Part, event: MovementBegun, positions: Positions) -> bool:
         """Return True when a movement only takes the place of one the same way."""
-        replaced = part.under_way or (part.broken_off and event.time_s - part.ended_s <= REPLACED_S)
+        replaced = part.moving or (part.broken_off and event.time_s - part.ended_s <= REPLACED_S)
         if not (replaced and part.sensed and type(part.begun.motion) is type(event.motion)):
             return False
         here = positions.get(event.name, part.start)
@@ -191,7 +191,7 @@ class SegmentBuilder:
             found = self._statement(name, part, positions, now_s)
             if found is not None:
                 statements.append(found)
-            if part.under_way and name != but:
+            if part.moving and name != but:
                 part.start = positions.get(name, part.start)
                 part.written = part.written or found is not None
                 self._parts[name] = part
@@ -208,7 +208,7 @@ class SegmentBuilder:
         if not part.sensed:
             return self._steps(name, part, now_s)
         end = part.end if part.end is not None else positions.get(name, part.start)
-        asked = isinstance(motion, MoveTo | MoveBy) and not part.under_way and not part.broken_off
+        asked = isinstance(motion, MoveTo | MoveBy) and not part.moving and not part.broken_off
         if not asked and abs(end - part.start) <= STILL[part.unit]:
             return None
         return Move(name, end - self._zero.get(name, 0.0), part.unit, by=False, line=0)
@@ -226,7 +226,7 @@ class SegmentBuilder:
                 return None
             return Steps(name, steps, motion.amplitude_v, motion.frequency_hz, 0)
         if isinstance(motion, Jog):
-            until_s = now_s if part.under_way else part.ended_s
+            until_s = now_s if part.moving else part.ended_s
             since_s = max(part.begun.time_s, self._since_s)
             steps = round(motion.direction * motion.speed * (until_s - since_s))
             hertz = max(1, round(motion.speed))

@@ -75,8 +75,8 @@ def _middle(mesh: BodyMesh, pose: Floats) -> Floats:
     return np.asarray(pose[:3, :3] @ ((low + high) / 2.0) + pose[:3, 3])
 
 
-def _foremost(mesh: BodyMesh, way: Floats) -> Floats:
-    along = mesh.vertices_mm @ way
+def _foremost(mesh: BodyMesh, heading: Floats) -> Floats:
+    along = mesh.vertices_mm @ heading
     reach = float(along.max() - along.min())
     return np.asarray(mesh.vertices_mm[along >= along.max() - _FOREMOST * reach].mean(axis=0))
 

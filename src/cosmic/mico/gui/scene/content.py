@@ -145,10 +145,10 @@ class SceneContent:
         poses = [self._poses_at(self._positions | dict(path[number])) for number in chosen]
         named = tuple(bodies)
         wanted = named or tuple(end.body for end in moving_ends(self.model))
-        ways = [self._way(body, poses) for body in wanted if body in self._tips]
-        return tuple(way for way in ways if named or np.ptp(way, axis=0).max() > _SAME_MM)
+        tracks = [self._track(body, poses) for body in wanted if body in self._tips]
+        return tuple(track for track in tracks if named or np.ptp(track, axis=0).max() > _SAME_MM)
 
-    def _way(self, body: str, poses: Sequence[Mapping[str, Floats]]) -> Floats:
+    def _track(self, body: str, poses: Sequence[Mapping[str, Floats]]) -> Floats:
         tip = self._tips[body]
         return np.array([pose[body][:3, :3] @ tip + pose[body][:3, 3] for pose in poses])
 

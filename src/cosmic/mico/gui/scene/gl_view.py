@@ -67,10 +67,10 @@ class GLSceneView(SceneView):
 
     @override
     def release(self) -> None:
-        self._context.release(self._give_back)
+        self._context.release(self._release)
         self._image = None
 
-    def _give_back(self) -> None:
+    def _release(self) -> None:
         for item in self._items.values():
             item.release()
         self._items = {}

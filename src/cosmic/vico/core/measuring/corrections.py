@@ -294,8 +294,8 @@ def _cut(line: Line, edit: Edit) -> tuple[Floats, Floats]:
 
 
 def _joined(first: Floats, second: Floats) -> Floats:
-    ways = [(one, other) for one in (first, first[::-1]) for other in (second, second[::-1])]
-    one, other = min(ways, key=lambda way: float(np.linalg.norm(way[0][-1] - way[1][0])))
+    orders = [(one, other) for one in (first, first[::-1]) for other in (second, second[::-1])]
+    one, other = min(orders, key=lambda order: float(np.linalg.norm(order[0][-1] - order[1][0])))
     return np.concatenate([one, other])
 
 
