@@ -345,6 +345,20 @@ def test_autofocus_looks_at_no_image_exposed_before_its_movement(
     assert abs(height_um) < 60.0, "the plate lies at 0"
 
 
+def test_two_images_focus_where_a_sweep_taught_how_fast_they_blur(lab: Lab) -> None:
+    lift(lab)
+    lens, optics = lab.rig.vico.lens, lab.scene.optics
+    assert lens is not None and optics is not None
+    lens.seek_focus(4100).wait(10.0)
+    lens.autofocus().wait(60.0)  # the first one sweeps, where none did before
+    for start in (4500, 3400):
+        lens.seek_focus(start).wait(10.0)
+        task = lens.autofocus()
+        task.wait(60.0)
+        assert task.progress.text.endswith("; 2 images")
+        assert abs(optics.projection(lab.now_s).focus_um) < 60.0, "the plate lies at 0"
+
+
 def test_a_camera_unplugged_while_it_records_leaves_a_file_that_can_be_read(
     lab: Lab, tmp_path: Path
 ) -> None:

@@ -180,6 +180,21 @@ def _add_measure(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--every", type=int, default=1, metavar="N", help="of a video each N-th image only"
     )
     measure.add_argument("--overwrite", action="store_true", help="replace results that exist")
+    measure.add_argument(
+        "--focal-stack",
+        action="store_true",
+        help="each file shows one thing at several heights of the focus: fibres in space",
+    )
+    measure.add_argument(
+        "--step-um", type=float, metavar="UM", help="between the heights of a focal stack"
+    )
+    measure.add_argument(
+        "--lens-distance-um",
+        type=float,
+        default=float("inf"),
+        metavar="UM",
+        help="from the focus to the lens, which looks askew away from its axis",
+    )
     correct = commands.add_parser("correct", help="correct the fibres found on an image")
     correct.add_argument("image", type=Path, metavar="IMAGE")
     correct.add_argument(

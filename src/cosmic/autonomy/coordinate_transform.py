@@ -30,7 +30,7 @@ from cosmic.vico.api.coordinate_transform import (
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import PixelMap
 from cosmic.vico.core.tool_settings import ToolSettings, tool_mistakes
-from cosmic.vico.core.vision.algorithms import FindTips, FindTools
+from cosmic.vico.core.vision.algorithms import FindTips, FindTools, TrackHeldFibres
 from cosmic.vico.core.vision.tool_types import ExpectedTool
 
 logger = logging.getLogger(__name__)
@@ -297,8 +297,10 @@ def join_transform(
 ) -> None:
     """Have the pixels of ViCo's cameras mean positions on the platform; raises `ConfigError`."""
     transform = PlatformTransform(vico, mico, folder, version)
+    if folder is not None:
+        vico.focus_models.keep_in(folder)
     for unit in vico.units.values():
-        for link in map(unit.chain.algorithm, ("tools", "tips")):
-            if isinstance(link, FindTools | FindTips):
+        for link in map(unit.chain.algorithm, ("tools", "tips", TrackHeldFibres.name)):
+            if isinstance(link, FindTools | FindTips | TrackHeldFibres):
                 link.expect = transform.expected_tools
     vico.transform = transform

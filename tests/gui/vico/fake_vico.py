@@ -10,6 +10,7 @@ from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.operation import Task
 from cosmic.vico.api.coordinate_transform import CalibrationShown
 from cosmic.vico.core.image import CameraImage, Circumstances
+from cosmic.vico.core.vision.tool_tips import HeldSeen
 from cosmic.vico.hw.interface import (
     CameraCounters,
     CameraInfo,
@@ -86,6 +87,7 @@ class Found:
     image: CameraImage
     fibres: tuple[Seen, ...] = ()
     tips: tuple[SeenTip, ...] = ()
+    held: tuple[HeldSeen, ...] = ()
 
 
 @dataclass(frozen=True)

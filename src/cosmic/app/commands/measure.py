@@ -4,6 +4,7 @@ import argparse
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from cosmic.frame.errors import CosmicError, RecordingError
@@ -11,8 +12,10 @@ from cosmic.vico.api.measure import (
     SUFFIXES,
     Measurement,
     measure_page,
+    measure_stack,
     read_images,
     write_csv,
+    write_heights,
     write_json,
     write_napari,
     write_networks,
@@ -126,6 +129,8 @@ def _lengths(lengths_um: Sequence[float]) -> list[str]:
 
 
 def _measured(file: Path, folder: Path, stem: str, chosen: argparse.Namespace) -> list[Measurement]:
+    if chosen.focal_stack:
+        return [_measured_stack(file, folder, stem, chosen)]
     found = []
     for number, page in enumerate(read_images(file, chosen.every), start=1):
         one = measure_page(page, chosen.pixel_size_um)
@@ -135,6 +140,23 @@ def _measured(file: Path, folder: Path, stem: str, chosen: argparse.Namespace) -
         write_napari(folder / f"{name}-napari.csv", one)
         found.append(one)
     return found
+
+
+def _measured_stack(file: Path, folder: Path, stem: str, chosen: argparse.Namespace) -> Measurement:
+    """Measure the pages of a file as images of one thing at several heights of the focus."""
+    stack = measure_stack(
+        list(read_images(file, chosen.every)),
+        None,
+        chosen.pixel_size_um,
+        step_um=chosen.step_um,
+        lens_distance_um=chosen.lens_distance_um,
+    )
+    one = replace(stack.measurement, name=file.name)
+    write_overlay(folder / f"{stem}-overlay.png", stack.sharp, one)
+    write_rois(folder / f"{stem}-rois.zip", one)
+    write_napari(folder / f"{stem}-napari.csv", one)
+    write_heights(folder, stem, stack.sharp, stack.heights)
+    return one
 
 
 def _prepare(folder: Path, *, overwrite: bool) -> None:

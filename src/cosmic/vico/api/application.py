@@ -16,6 +16,7 @@ from cosmic.frame.task_application import TaskApplication
 from cosmic.vico.api.coordinate_transform import CoordinateTransform
 from cosmic.vico.core.camera_libraries import CameraLibraries
 from cosmic.vico.core.camera_unit import CameraUnit
+from cosmic.vico.core.focus_models import FocusModels
 from cosmic.vico.core.image import Circumstances
 from cosmic.vico.core.lens_control import PeripheralThread
 from cosmic.vico.core.settings import CameraConfig, VicoSettings
@@ -45,6 +46,8 @@ class VicoApplication(TaskApplication):
         sample at which it did and the time of that sample, or None. Returns at once.
     position_source : callable or None
         Returns where every axis was at a platform time; called in the cameras' threads.
+    focus_models : FocusModels
+        How fast images blur with the focus, as far as sweeps have taught it.
     points : Points or None
         What joins pixels and platform, where micromanipulation is hosted as well.
     """
@@ -67,6 +70,7 @@ class VicoApplication(TaskApplication):
         self.clock = clock
         self.libraries = CameraLibraries(make_library)
         self.zoom_scale: ZoomScale = settings.lens.zoom_scale()
+        self.focus_models = FocusModels()
         self.position_source: Callable[[float], Mapping[str, float]] | None = None
         self.sample_source: Callable[[str, float], tuple[int, float] | None] | None = None
         self.transform: CoordinateTransform | None = None

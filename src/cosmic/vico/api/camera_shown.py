@@ -1,6 +1,6 @@
 """What a camera's view shows of its recordings and of machine vision."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
@@ -10,7 +10,7 @@ from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.recording.formats import FORMATS, ImageFormat, recording_suffix
 from cosmic.vico.core.recording.video_writer import check_codec
 from cosmic.vico.core.vision.chain import Analysis, LinkState, Unavailable
-from cosmic.vico.core.vision.tool_tips import TipSeen
+from cosmic.vico.core.vision.tool_tips import HeldSeen, TipSeen
 from cosmic.vico.hw.interface import CameraSettings
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ DESCRIPTIONS = {
     "place track": "follow one point from image to image",
     "tools": "measure the ends of grippers and probe",
     "tips": "find the tips of grippers and probe",
+    "held fibre": "follow the fibre that a gripper holds, and its slope at the jaws",
 }
 
 
@@ -62,19 +63,29 @@ class Seen:
     image: CameraImage
     fibres: tuple["Fibre", ...]
     tips: tuple[TipSeen, ...]
+    held: tuple[HeldSeen, ...] = ()
     picture = Renamed("image")
 
     @classmethod
     def of(cls, newest: Analysis) -> Self:
         """Return what is shown of the newest analysis."""
         fibres, tips = newest.results.get("fibres"), newest.results.get("tips")
+        held = newest.results.get("held fibre")
         return cls(
             newest.image,
             fibres if isinstance(fibres, tuple) else (),
             tuple(each for each in tips if isinstance(each, TipSeen))
             if isinstance(tips, tuple)
             else (),
+            _held(held) if isinstance(held, Mapping) else (),
         )
+
+
+def _held(tracks: Mapping[str, object]) -> tuple[HeldSeen, ...]:
+    from cosmic.vico.core.vision.held_tracking import held_seen
+
+    found = (held_seen(name, track) for name, track in tracks.items())
+    return tuple(each for each in found if each is not None)
 
 
 def links_shown(states: Sequence[LinkState], newest: Analysis | None) -> tuple[LinkShown, ...]:

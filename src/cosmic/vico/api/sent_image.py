@@ -12,7 +12,7 @@ from cosmic.vico.api.camera_shown import Seen
 from cosmic.vico.api.coordinate_transform import CoordinateTransform, Pixel
 from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.core.vision.fibre import Fibre
-from cosmic.vico.core.vision.tool_tips import TipSeen
+from cosmic.vico.core.vision.tool_tips import HeldSeen, TipSeen
 from cosmic.vico.hw.interface import Frame, FrameStatus, PixelFormat
 
 NOT_HOSTED = "micromanipulation is not hosted there"
@@ -175,6 +175,7 @@ class SentSeen:
     shape: tuple[int, ...]
     fibres: tuple[Fibre, ...]
     tips: tuple[TipSeen, ...]
+    held: tuple[HeldSeen, ...] = ()
 
     @classmethod
     def of(cls, seen: Seen) -> "SentSeen":
@@ -186,13 +187,15 @@ class SentSeen:
             tuple(data.shape),
             tuple(_plain(each) for each in seen.fibres),
             tuple(_plain_tip(each) for each in seen.tips),
+            seen.held,
         )
 
     def received(self) -> Seen:
         """Return what a view shows; its image is empty."""
         bare = self.image.received()
         nothing = np.broadcast_to(np.zeros((), np.uint8), self.shape)
-        return Seen(replace(bare, frame=replace(bare.frame, data=nothing)), self.fibres, self.tips)
+        empty = replace(bare, frame=replace(bare.frame, data=nothing))
+        return Seen(empty, self.fibres, self.tips, self.held)
 
 
 def _plain(fibre: Fibre) -> Fibre:

@@ -11,21 +11,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
 from cosmic.frame.errors import ConfigError, NotAvailable
-from cosmic.vico.core.vision.grey import Floats, grey_image
+from cosmic.vico.core.vision.grey import Floats, Floats32, grey_image
 
 BINS: Final = 40
+TILE_PX: Final = 128
+MOST_TILES: Final = 32
+OVERLAP: Final = 4.0
 HIGHEST: Final = 0.35
 """Cycles per pixel: above, lenses pass little but noise."""
 NOISE_FROM: Final = 0.42
 NOISE_TIMES: Final = 4.0
-FEWEST_BINS: Final = 5
+FEWEST_BINS: Final = 4
 FEWEST_IMAGES: Final = 4
 LARGEST_STD: Final = 0.5
 """Of the distance between the two images: less sure is no answer."""
+TOO_LITTLE: Final = "focus: the images show too little detail to compare their blur"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,32 +68,15 @@ def blur_difference(
     NotAvailable
         They show too little detail.
     """
-    first, second = grey_image(one), grey_image(other)
-    if first.shape != second.shape:
-        raise ConfigError(
-            f"focus: images of {first.shape} and {second.shape} cannot be compared; take both with "
-            "the same ROI and binning"
-        )
-    frequency, power_one, weight = _spectrum(first.astype(np.float64))
-    _, power_other, _ = _spectrum(second.astype(np.float64))
-    floors = [float(np.median(each[frequency > NOISE_FROM])) for each in (power_one, power_other)]
-    used = (frequency < HIGHEST) & (weight > 0)
-    for power, floor in zip((power_one, power_other), floors, strict=True):
-        used &= power > NOISE_TIMES * floor
-    if used.sum() < FEWEST_BINS:
-        raise NotAvailable("focus: the images show too little detail to compare their blur")
-    ratio = np.log(power_one[used] - floors[0]) - np.log(power_other[used] - floors[1])
-    against = -4.0 * np.pi**2 * frequency[used] ** 2
-    number = weight[used]
-    slope = float((number * against * ratio).sum() / (number * against**2).sum())
-    rest = ratio - slope * against
-    scatter = float((number * rest**2).sum() / number.sum()) * number.sum() / (used.sum() - 1)
-    std = float(np.sqrt(scatter / (number * against**2).sum()))
-    return slope, std
+    images = [_relative(each) for each in (one, other)]
+    corners = _detailed(images)
+    return _difference(*(_Spectra.of(each, corners) for each in images))
 
 
 def calibrate(images: Sequence[tuple[float, npt.NDArray[np.generic]]]) -> DefocusModel:
     """Return the model from images of the same things at some positions of the focus.
+
+    Those so far off that they show no detail are left out.
 
     Raises
     ------
@@ -97,11 +85,21 @@ def calibrate(images: Sequence[tuple[float, npt.NDArray[np.generic]]]) -> Defocu
     NotAvailable
         The images tell nothing: too little detail, or the blur does not grow.
     """
-    places = np.array([place for place, _ in images], dtype=np.float64)
-    if len(set(places.tolist())) < FEWEST_IMAGES:
-        raise ConfigError(f"focus: {FEWEST_IMAGES} positions or more are needed, not {len(places)}")
-    first = images[0][1]
-    blurs = np.array([0.0, *(blur_difference(each, first)[0] for _, each in images[1:])])
+    if len({place for place, _ in images}) < FEWEST_IMAGES:
+        raise ConfigError(f"focus: {FEWEST_IMAGES} positions or more are needed, not {len(images)}")
+    seen = [(place, _relative(each)) for place, each in images]
+    corners = _detailed([each for _, each in seen])
+    spectra = [(place, _Spectra.of(each, corners)) for place, each in seen]
+    _, sharpest = max(spectra, key=lambda each: each[1].detail)
+    found = []
+    for place, each in spectra:
+        try:
+            found.append((place, 0.0 if each is sharpest else _difference(each, sharpest)[0]))
+        except NotAvailable:
+            continue
+    if len({place for place, _ in found}) < FEWEST_IMAGES:
+        raise NotAvailable(TOO_LITTLE)
+    places, blurs = np.array(found, dtype=np.float64).T
     middle, width = float(places.mean()), float(np.ptp(places))
     curve, spread = np.polyfit((places - middle) / width, blurs, 2, cov="unscaled")
     rest = blurs - np.polyval(curve, (places - middle) / width)
@@ -139,18 +137,131 @@ def in_focus(
     return InFocus(0.5 * (one[0] + other[0]) - offset, float(error))
 
 
-def _spectrum(values: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return frequencies in cycles per pixel, mean power there, and how many values it is of."""
-    rows, columns = values.shape
-    window = np.outer(np.hanning(rows), np.hanning(columns))
-    level = float(values.mean())
-    found = np.abs(np.fft.rfft2((values - level) / max(level, 1e-9) * window)) ** 2
-    radius = np.hypot(np.fft.fftfreq(rows)[:, None], np.fft.rfftfreq(columns)[None, :])
-    index = np.minimum((radius * 2.0 * BINS).astype(np.intp), BINS - 1).ravel()
-    count = np.bincount(index, minlength=BINS).astype(np.float64)
-    total = np.bincount(index, found.ravel(), BINS)
-    mean = np.bincount(index, radius.ravel(), BINS)
-    safe = np.maximum(count, 1.0)
-    # The lowest is the light's own slope.
-    count[0] = 0.0
-    return mean / safe, np.maximum(total / safe, 1e-30), count
+def _relative(image: npt.NDArray[np.generic]) -> Floats32:
+    """Return brightness as a part of the mean."""
+    grey = grey_image(image).astype(np.float32)
+    return np.asarray(grey / np.float32(max(float(grey.mean()), 1e-6)), dtype=np.float32)
+
+
+def _detailed(images: Sequence[Floats32]) -> list[tuple[int, int]]:
+    """Return corners of the tiles in which the images show most; raises `ConfigError`.
+
+    A fibre covers a hundredth of an image: elsewhere there is only noise.
+    """
+    shapes = {each.shape for each in images}
+    if len(shapes) > 1:
+        first, second = sorted(shapes)[:2]
+        raise ConfigError(
+            f"focus: images of {first} and {second} cannot be compared; take both with the same "
+            "ROI and binning"
+        )
+    rows, columns = images[0].shape
+    side = min(TILE_PX, rows, columns)
+    energy = np.zeros((rows, columns), np.float32)
+    for each in images:
+        band = cv2.GaussianBlur(each, (0, 0), 2.0) - cv2.GaussianBlur(each, (0, 0), 10.0)
+        energy += band**2
+    whole = cv2.integral(energy)
+    corners = [
+        (y, x)
+        for y in range(0, rows - side + 1, side // 2)
+        for x in range(0, columns - side + 1, side // 2)
+    ]
+    power = [
+        float(whole[y + side, x + side] - whole[y, x + side] - whole[y + side, x] + whole[y, x])
+        for y, x in corners
+    ]
+    ranked = sorted(range(len(corners)), key=lambda each: -power[each])[:MOST_TILES]
+    return [corners[each] for each in ranked]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Spectra:
+    """How much detail the tiles of an image have, by frequency.
+
+    Attributes
+    ----------
+    power : ndarray, shape (tiles, BINS)
+    number : ndarray, shape (BINS,)
+        How many values each is the mean of.
+    floor : float
+        What is noise.
+    """
+
+    frequency: Floats
+    power: Floats
+    number: Floats
+    floor: float
+
+    @classmethod
+    def of(cls, image: Floats32, corners: Sequence[tuple[int, int]]) -> "_Spectra":
+        side = min(TILE_PX, *image.shape)
+        tiles = np.stack([image[y : y + side, x : x + side] for y, x in corners]).astype(np.float64)
+        tiles -= tiles.mean(axis=(1, 2), keepdims=True)
+        window = np.outer(np.hanning(side), np.hanning(side))
+        found = np.abs(np.fft.rfft2(tiles * window)) ** 2
+        radius = np.hypot(np.fft.fftfreq(side)[:, None], np.fft.rfftfreq(side)[None, :]).ravel()
+        index = np.minimum((radius * 2.0 * BINS).astype(np.intp), BINS - 1)
+        count = np.bincount(index, minlength=BINS).astype(np.float64)
+        safe = np.maximum(count, 1.0)
+        power = np.stack([np.bincount(index, each.ravel(), BINS) / safe for each in found])
+        frequency = np.bincount(index, radius, BINS) / safe
+        count[0] = 0.0  # the light's own slope
+        floor = float(np.median(power[:, frequency > NOISE_FROM]))
+        return cls(frequency, np.maximum(power, 1e-30), count, floor)
+
+    @property
+    def detail(self) -> float:
+        """Weight of fine detail, larger for a sharper image of the same things."""
+        clear = np.maximum(self.power - self.floor, 0.0).sum(axis=0) * (self.frequency < HIGHEST)
+        return float((self.number * clear * self.frequency**2).sum())
+
+
+def _difference(first: _Spectra, second: _Spectra) -> tuple[float, float]:
+    """Return the difference of squared blurs that most tiles agree in.
+
+    Dust on the sensor is sharp on every image; what lies at other heights differs otherwise.
+    """
+    found = [
+        each
+        for one, other in zip(first.power, second.power, strict=True)
+        if (each := _of_tile(one, other, first, second)) is not None
+    ]
+    if not found:
+        raise NotAvailable(TOO_LITTLE)
+    slopes, stds = np.array(found).T
+    order = np.argsort(slopes)
+    weight = np.cumsum(stds[order] ** -2)
+    middle = float(slopes[order][np.searchsorted(weight, 0.5 * weight[-1])])
+    spread = 1.4826 * float(np.median(np.abs(slopes - middle)))
+    near = np.abs(slopes - middle) <= 3.0 * np.hypot(spread, stds)
+    weights = stds[near] ** -2
+    mean = float((slopes[near] * weights).sum() / weights.sum())
+    # Tiles overlap, by half each way.
+    scatter = float((weights * (slopes[near] - mean) ** 2).sum() / weights.sum())
+    number = max(1.0, near.sum() / OVERLAP)
+    std = np.hypot(np.sqrt(scatter / number), np.sqrt(OVERLAP / weights.sum()))
+    return mean, float(std)
+
+
+def _of_tile(
+    one: Floats, other: Floats, first: _Spectra, second: _Spectra
+) -> tuple[float, float] | None:
+    """Return the difference in one tile and its deviation; None where it shows too little."""
+    used = (first.frequency < HIGHEST) & (first.number > 0)
+    used &= (one > NOISE_TIMES * first.floor) & (other > NOISE_TIMES * second.floor)
+    # From the lowest on without a gap: beyond, the first zero of a lens' disc says nothing.
+    used[1:] &= np.cumprod(used[1:]).astype(bool)
+    if used.sum() < FEWEST_BINS:
+        return None
+    ratio = np.log(one[used] - first.floor) - np.log(other[used] - second.floor)
+    against = -4.0 * np.pi**2 * first.frequency[used] ** 2
+    number = first.number[used]
+    # The level is free: how bright the lamp is says nothing.
+    mean = float((number * against).sum() / number.sum())
+    level = float((number * ratio).sum() / number.sum())
+    across = float((number * (against - mean) ** 2).sum())
+    slope = float((number * (against - mean) * (ratio - level)).sum()) / across
+    rest = ratio - level - slope * (against - mean)
+    scatter = float((number * rest**2).sum()) / max(int(used.sum()) - 2, 1)
+    return slope, float(np.sqrt(max(scatter, 1e-12) / across))

@@ -9,7 +9,7 @@ from PySide6.QtGui import QPainter, QPainterPath, QPolygonF
 from cosmic.frame.overrides import override
 from cosmic.vico.api.camera_shown import Seen
 from cosmic.vico.core.vision.fibre import Fibre
-from cosmic.vico.core.vision.tool_tips import TipSeen
+from cosmic.vico.core.vision.tool_tips import HeldSeen, TipSeen
 from cosmic.vico.gui.image_view import CameraImageView, Layer
 from cosmic.vico.gui.ink import GREEN, HALO, ORANGE, SKY, WHITE, label, pen, stroke
 from cosmic.vico.gui.texts import length_text
@@ -44,6 +44,8 @@ class SeenLayer(Layer):
         scale = found.image.circumstances.scale_um_px
         for fibre in found.fibres:
             self._paint_fibre(painter, view, fibre, scale)
+        for held in found.held:
+            self._paint_held(painter, view, held, scale)
         for tip in found.tips:
             self._paint_tip(painter, view, tip)
 
@@ -80,6 +82,17 @@ class SeenLayer(Layer):
         box = label(painter, point, text, colour, QRectF(view.rect()), gap=14.0, taken=self._taken)
         said = "certain" if fibre.certain else f"{NOT_SURE}: " + "; ".join(fibre.doubts)
         self.labels.append((box, f"Fibre, {said}"))
+
+    def _paint_held(
+        self, painter: QPainter, view: CameraImageView, held: HeldSeen, scale: float | None
+    ) -> None:
+        colour = SKY if held.certain else ORANGE
+        stroke(painter, _path(held.line_px, view), pen(colour, 2.0, dashed=not held.certain))
+        free = f"{length_text(held.length_px, scale)} free, {held.angle_deg:+.1f}° at the jaws"
+        text = f"{held.name}: {free}" if held.certain else f"{held.name}: {free}, {NOT_SURE}"
+        point = view.to_screen.map(QPointF(*held.line_px[len(held.line_px) // 2]))
+        box = label(painter, point, text, colour, QRectF(view.rect()), gap=14.0, taken=self._taken)
+        self.labels.append((box, f"Fibre held by {text}"))
 
     def _paint_tip(self, painter: QPainter, view: CameraImageView, tip: TipSeen) -> None:
         point = view.to_screen.map(QPointF(*tip.point_px))

@@ -35,12 +35,15 @@ class FileImage:
     ----------
     pixels : ndarray, shape (height, width) or (height, width, layers)
         Colours in the order blue, green, red.
+    step_um : float or None
+        Distance in height to the next page, where the file says so.
     """
 
     name: str
     pixels: npt.NDArray[np.generic]
     pixel_size_um: float | None
     pixel_size_from: str
+    step_um: float | None = None
 
 
 def read_images(path: Path, every: int = 1) -> Iterator[FileImage]:
@@ -76,6 +79,7 @@ def _tiff_pages(path: Path) -> Iterator[FileImage]:
     try:
         with tifffile.TiffFile(path) as file:
             size, source = _tiff_size_um(file)
+            step = _tiff_step_um(file)
             count = len(file.pages)
             for number in range(count):
                 pixels = file.pages[number].asarray()
@@ -84,7 +88,7 @@ def _tiff_pages(path: Path) -> Iterator[FileImage]:
                 if pixels.ndim == 3 and pixels.shape[2] in (3, 4):
                     pixels = pixels[:, :, [2, 1, 0]]
                 name = path.name if count == 1 else f"{path.name} page {number + 1}"
-                yield FileImage(name, pixels, size, source)
+                yield FileImage(name, pixels, size, source, step)
     except (OSError, ValueError, LookupError, struct.error, tifffile.TiffFileError) as exc:
         raise RecordingError(f"{path}: cannot be read ({exc})") from exc
 
@@ -112,7 +116,7 @@ def _video_images(path: Path, every: int) -> Iterator[FileImage]:
 
 def _tiff_size_um(file: "tifffile.TiffFile") -> tuple[float | None, str]:
     """Return the pixel size of OME, else of ImageJ, else of the resolution."""
-    ome = _ome_size_um(file.ome_metadata)
+    ome = _ome_size_um(file.ome_metadata, "X")
     if ome:
         return ome, "OME"
     first: Any = file.pages[0]  # by type a frame as well, which the first one never is
@@ -130,7 +134,15 @@ def _tiff_size_um(file: "tifffile.TiffFile") -> tuple[float | None, str]:
     return (size, "TIFF resolution") if 0 < size < PRINTED_UM else (None, NOT_KNOWN)
 
 
-def _ome_size_um(text: str | None) -> float | None:
+def _tiff_step_um(file: "tifffile.TiffFile") -> float | None:
+    """Return the distance of the planes in height, of OME, else of ImageJ."""
+    found = file.imagej_metadata or {}
+    unit = (UM_IN | WORDS).get(str(found.get("unit", "")), 0.0)
+    spacing = abs(float(found.get("spacing", 0.0))) * unit
+    return _ome_size_um(file.ome_metadata, "Z") or (spacing if 0 < spacing < np.inf else None)
+
+
+def _ome_size_um(text: str | None, axis: str) -> float | None:
     if not text:
         return None
     try:
@@ -138,9 +150,9 @@ def _ome_size_um(text: str | None) -> float | None:
     except ElementTree.ParseError:
         return None
     for each in root.iter():
-        if each.tag.endswith("}Pixels") and "PhysicalSizeX" in each.attrib:
-            unit = UM_IN.get(each.attrib.get("PhysicalSizeXUnit", "µm"), 0.0)
-            size = float(each.attrib["PhysicalSizeX"]) * unit
+        if each.tag.endswith("}Pixels") and f"PhysicalSize{axis}" in each.attrib:
+            unit = UM_IN.get(each.attrib.get(f"PhysicalSize{axis}Unit", "µm"), 0.0)
+            size = float(each.attrib[f"PhysicalSize{axis}"]) * unit
             return size if 0 < size < float("inf") else None
     return None
 

@@ -15,7 +15,10 @@ import numpy.typing as npt
 from cosmic.frame.errors import RecordingError
 from cosmic.vico.core.measuring.measurement import Measurement
 from cosmic.vico.core.vision.fibre import Fibre
+from cosmic.vico.core.vision.focal_stack import HeightMap
 from cosmic.vico.core.vision.grey import grey_image
+from cosmic.vico.core.vision.spatial import SpatialFibre
+from cosmic.vico.hw.interface import Pixels
 
 CERTAIN_BGR, DOUBTFUL_BGR = (80, 200, 60), (40, 140, 255)
 NETWORK_BGR, BUNDLE_BGR = (220, 180, 40), (200, 60, 200)
@@ -69,14 +72,41 @@ def write_json(path: Path, measured: Sequence[Measurement]) -> None:
             "pixel_size_um": each.pixel_size_um,
             "pixel_size_from": each.pixel_size_from,
             "fibres": [
-                row | {"centre_line_px": np.round(fibre.centre_line_px, 3).tolist()}
-                for row, fibre in zip(each.rows(), each.fibres, strict=True)
+                row | {"centre_line_px": np.round(fibre.centre_line_px, 3).tolist()} | space
+                for row, fibre, space in zip(each.rows(), each.fibres, _lines_um(each), strict=True)
             ],
             "network": _whole_network(each),
         }
         for each in measured
     ]
     _write(path, json.dumps({"images": images}, indent=1, ensure_ascii=False).encode())
+
+
+def _lines_um(measured: Measurement) -> list[dict[str, object]]:
+    """Return the line in space of each fibre of a focal stack."""
+    if not measured.spatial:
+        return [{} for _ in measured.fibres]
+    return [
+        {"line_um": np.round(each.line_um, 3).tolist()} if isinstance(each, SpatialFibre) else {}
+        for each in measured.spatial
+    ]
+
+
+def write_heights(folder: Path, stem: str, sharp: Pixels, heights: HeightMap) -> None:
+    """Write the sharp image as PNG and the heights, um, as a TIFF of floats with NaN.
+
+    Raises
+    ------
+    RecordingError
+        They cannot be written.
+    """
+    for name, (done, coded) in {
+        f"{stem}-sharp.png": cv2.imencode(".png", sharp),
+        f"{stem}-heights.tif": cv2.imencode(".tif", heights.height_um),
+    }.items():
+        if not done:
+            raise RecordingError(f"{folder / name}: cannot be coded")
+        _write(folder / name, coded.tobytes())
 
 
 def _whole_network(measured: Measurement) -> dict[str, object] | None:

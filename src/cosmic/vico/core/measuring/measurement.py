@@ -1,6 +1,7 @@
 """The fibres of one image with its pixel size."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,15 @@ from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.vico.core.measuring.image_files import NOT_KNOWN, FileImage, read_images
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.finding import find_fibres
+from cosmic.vico.core.vision.focal_stack import (
+    FocalStack,
+    HeightMap,
+    height_map,
+    sharp_image,
+)
 from cosmic.vico.core.vision.network import Network, find_network
+from cosmic.vico.core.vision.spatial import SpatialFibre, View, heights_along, in_space
+from cosmic.vico.hw.interface import Pixels
 
 FEWEST_SEGMENTS = 20
 """Less is dirt, not a network."""
@@ -41,6 +50,8 @@ class Measurement:
         Where it was found.
     network : Network or None
         Where so much stands out that no single fibre is certain.
+    spatial : tuple of SpatialFibre or str
+        Of a focal stack, for each fibre: how it lies in space, or why that is not known.
     """
 
     name: str
@@ -49,6 +60,7 @@ class Measurement:
     pixel_size_um: float | None
     pixel_size_from: str
     network: Network | None = None
+    spatial: tuple[SpatialFibre | str, ...] = ()
 
     @property
     def lengths_um(self) -> tuple[float, ...]:
@@ -110,9 +122,26 @@ class Measurement:
                     None if self.pixel_size_um is None else bound * self.pixel_size_um
                 )
             row |= {name: getattr(fibre, name) for name in PLAIN}
+            if self.spatial:
+                row |= _spatial_columns(self.spatial[number - 1])
             row["doubts"] = "; ".join(fibre.doubts)
             found.append(row)
         return found
+
+
+def _spatial_columns(found: SpatialFibre | str) -> dict[str, Value]:
+    """Return what a focal stack says of a fibre, or empty columns with the reason."""
+    known = found if isinstance(found, SpatialFibre) else None
+    heights = None if known is None else known.line_um[:, 2]
+    return {
+        "spatial_length_um": None if known is None else known.length_um,
+        "spatial_length_std_um": None if known is None else known.length_std_um,
+        "tilt_deg": None if known is None else known.tilt_deg,
+        "tilt_std_deg": None if known is None else known.tilt_std_deg,
+        "lowest_um": None if heights is None else float(heights.min()),
+        "highest_um": None if heights is None else float(heights.max()),
+        "spatial_doubt": found if isinstance(found, str) else "",
+    }
 
 
 def measure(
@@ -157,6 +186,86 @@ def measure_page(page: FileImage, pixel_size_um: float | None = None) -> Measure
     return Measurement(
         page.name, fibres, (rows, columns), size, source, _network(page) if dense else None
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredStack:
+    """What was measured on a focal stack.
+
+    Attributes
+    ----------
+    measurement : Measurement
+        Of `sharp`, with `spatial`.
+    sharp : ndarray, shape (height, width)
+        One image that is sharp everywhere.
+    heights : HeightMap
+    """
+
+    measurement: Measurement
+    sharp: Pixels
+    heights: HeightMap
+
+
+def measure_stack(
+    pages: Sequence[FileImage] | Sequence[npt.NDArray[np.generic]],
+    heights_um: Sequence[float] | None = None,
+    pixel_size_um: float | None = None,
+    *,
+    step_um: float | None = None,
+    lens_distance_um: float = np.inf,
+) -> MeasuredStack:
+    """Measure fibres in space, on images of them at several heights of the focus.
+
+    Parameters
+    ----------
+    pages : sequence of FileImage or ndarray, shape (height, width)
+    heights_um : sequence of float, optional
+        Height of the focus on each; otherwise they are `step_um` apart, or as far as the file says.
+    pixel_size_um : float, optional
+        At the height of the fibres; otherwise what the file says.
+    lens_distance_um : float
+        From the focus to the lens' entrance pupil, in the middle of the image; without it the lens
+        is taken to be telecentric.
+
+    Raises
+    ------
+    ConfigError
+        Heights or pixel size are not known or none, or there are fewer than four images.
+    NotAvailable
+        Fibres cannot be looked for on them.
+    """
+    files = [each if isinstance(each, FileImage) else _from_array(each) for each in pages]
+    if not files or (pixel_size_um is None and files[0].pixel_size_um is None):
+        raise ConfigError("a fibre in space needs images and a pixel size; give one")
+    if heights_um is None:
+        step = step_um if step_um is not None else next((each.step_um for each in files), None)
+        if step is None or not 0.0 < step < np.inf:
+            raise ConfigError(
+                f"the heights of the focus are not known (step {step} µm); the file says nothing "
+                "of them: give the step"
+            )
+        heights_um = [step * number for number in range(len(files))]
+    stack = FocalStack.of([each.pixels for each in files], heights_um)
+    heights = height_map(stack)
+    sharp = sharp_image(stack, heights)
+    flat = measure_page(replace(files[0], pixels=sharp), pixel_size_um)
+    view = View(flat.pixel_size_um or np.nan, distance_um=lens_distance_um)
+    spatial = tuple(_in_space(stack, fibre, view) for fibre in flat.fibres)
+    return MeasuredStack(replace(flat, spatial=spatial), sharp, heights)
+
+
+def _from_array(pixels: npt.NDArray[np.generic]) -> FileImage:
+    return FileImage("", pixels, None, NOT_KNOWN)
+
+
+def _in_space(stack: FocalStack, fibre: Fibre, view: View) -> SpatialFibre | str:
+    try:
+        heights = heights_along(stack, fibre.centre_line_px, fibre.width_px)
+    except NotAvailable as exc:
+        return str(exc)
+    found = in_space(fibre.centre_line_px, heights, view, stack.images[0].shape)
+    ends_um = fibre.length_std_px * view.scale_um_px
+    return replace(found, length_std_um=float(np.hypot(found.length_std_um, ends_um)))
 
 
 def _network(page: FileImage) -> Network | None:

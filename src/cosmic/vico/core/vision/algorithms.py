@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import Final, cast
+from typing import TYPE_CHECKING, Final, cast
 
 import cv2
 
@@ -18,6 +18,7 @@ from cosmic.vico.core.vision.chain import (
     Chain,
     Results,
     Unavailable,
+    algorithm,
 )
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.fibre_tracking import FibreTracker
@@ -26,9 +27,14 @@ from cosmic.vico.core.vision.tool_types import ExpectedTool
 from cosmic.vico.core.vision.tracking import TemplateTracker
 from cosmic.vico.hw.interface import Pixels, Roi
 
+if TYPE_CHECKING:
+    from cosmic.vico.core.vision.held_tracking import HeldFibreTracker
+
 logger = logging.getLogger(__name__)
 
 NO_TOOL: Final = "no tool is expected on the image: calibrate with it, and bring it there"
+
+NO_GRIPPER: Final = "no gripper is expected on the image: calibrate with it, and bring it there"
 
 
 BUILT_IN: Final = ("focus", "fibres", "fibre track", "place track", "tools", "tips")
@@ -261,9 +267,40 @@ class FindTips:
         return tuple(each for each in seen if each is not None)
 
 
-def _backend(algorithm: Callable[[], Algorithm]) -> AnalysisBackend:
+@algorithm
+class TrackHeldFibres:
+    """The free part of the fibre in each gripper; maps each gripper's name to a `HeldTrack`.
+
+    Attributes
+    ----------
+    expect : callable or None
+        Tells from an image where the tools should be on it.
+    """
+
+    name = "held fibre"
+
+    def __init__(self) -> None:
+        self.expect: Expect | None = None
+        self._trackers: dict[str, HeldFibreTracker] = {}
+
+    def run(self, image: CameraImage, results: Results) -> object:  # noqa: ARG002
+        """Follow them."""
+        from cosmic.vico.core.vision.held_tracking import HeldFibreTracker
+
+        expected = self.expect(image) if self.expect is not None else {}
+        grippers = {name: tool for name, tool in expected.items() if tool.gap_px > 0.0}
+        if not grippers:
+            return Unavailable(NO_GRIPPER)
+        data = grey(image.data)
+        self._trackers = {name: self._trackers.get(name) or HeldFibreTracker() for name in grippers}
+        return MappingProxyType(
+            {name: self._trackers[name].follow(data, tool) for name, tool in grippers.items()}
+        )
+
+
+def _backend(make_one: Callable[[], Algorithm]) -> AnalysisBackend:
     def made(_options: NoOptions, _context: None) -> Algorithm:
-        return algorithm()
+        return make_one()
 
     return AnalysisBackend(made)
 

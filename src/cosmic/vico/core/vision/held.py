@@ -6,14 +6,13 @@ one and several widths further out says where, and in which direction, the fibre
 """
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.vico.core.vision import axial, beyond, certainty, checks
 from cosmic.vico.core.vision.ends import EndKind
-from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.grey import Floats
 from cosmic.vico.core.vision.profiles import Flags
 from cosmic.vico.core.vision.smoothing import arc_lengths, resampled
@@ -38,6 +37,7 @@ OF_THE_JAWS: Final = frozenset(
         beyond.SOFT,
         certainty.IMPROBABLE,
         checks.CONTINUES,
+        checks.IMPRECISE,
         checks.LEFT_OVER,
     }
 )
@@ -89,7 +89,38 @@ class HeldShape:
     doubts: tuple[str, ...]
 
 
-def held_shape(fibre: Fibre, gripper: GripperTips, other: GripperTips | None = None) -> HeldShape:
+class TracedLine(Protocol):
+    """What `held_shape` takes: a `Fibre`, or a line that was followed."""
+
+    @property
+    def centre_line_px(self) -> Floats:
+        """Points x, y from end to end, shape (n, 2)."""
+        ...
+
+    @property
+    def width_px(self) -> float:
+        """Mean width."""
+        ...
+
+    @property
+    def ends_px(self) -> Floats:
+        """The two ends, shape (2, 2)."""
+        ...
+
+    @property
+    def ends_std_px(self) -> Floats:
+        """How sure each is, shape (2,)."""
+        ...
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why it may not be one whole fibre."""
+        ...
+
+
+def held_shape(
+    fibre: TracedLine, gripper: GripperTips, other: GripperTips | None = None
+) -> HeldShape:
     """Return the free part of a fibre between a gripper and its tip, or between two grippers.
 
     Raises

@@ -1,10 +1,11 @@
-"""What machine vision says about the tips of grippers and probe, in short."""
+"""What machine vision says about tools and what they hold, in short."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from cosmic.frame.renamed import Renamed
 from cosmic.vico.core.image import CameraImage
+from cosmic.vico.core.vision.grey import Floats
 from cosmic.vico.core.vision.tips import find_gripper, find_probe
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen, ToolEnd
 from cosmic.vico.hw.interface import Pixels
@@ -29,6 +30,27 @@ class TipSeen:
     point_px: tuple[float, float]
     certain: bool
     place_px = Renamed("point_px")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldSeen:
+    """A held fibre in short, for the display.
+
+    Attributes
+    ----------
+    name : str
+        Of the gripper.
+    line_px : ndarray, shape (n, 2)
+        Its free part.
+    angle_deg : float
+        At the clamp, from the direction of the gripper.
+    """
+
+    name: str
+    line_px: Floats
+    length_px: float
+    angle_deg: float
+    certain: bool
 
 
 def find_tool(image: Pixels, expected: ExpectedTool) -> Found:
