@@ -359,6 +359,26 @@ def test_two_images_focus_where_a_sweep_taught_how_fast_they_blur(lab: Lab) -> N
         assert abs(optics.projection(lab.now_s).focus_um) < 60.0, "the plate lies at 0"
 
 
+def test_a_camera_that_comes_back_has_the_settings_that_were_in_force(lab: Lab) -> None:
+    camera = lab.rig.vico.camera()
+    before = camera.settings
+    assert before is not None
+    changed = replace(before, exposure_s=0.011, rate_hz=9.0, roi=Roi(400, 300, 800, 600))
+    camera.configure(changed).wait(10.0)
+    try:
+        lab.cameras.faults.inject("unplugged", camera="Sim1")
+        try:
+            wait_until(lambda: bool(camera.problem))
+            assert camera.settings is None
+        finally:
+            lab.cameras.faults.clear()
+        wait_until(lambda: camera.info is not None and camera.running)
+        assert camera.settings == changed
+        assert camera.next_image(10.0).data.shape == (600, 800)
+    finally:
+        camera.configure(before).wait(10.0)
+
+
 def test_a_camera_unplugged_while_it_records_leaves_a_file_that_can_be_read(
     lab: Lab, tmp_path: Path
 ) -> None:

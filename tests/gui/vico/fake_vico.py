@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from cosmic.frame.errors import ConfigError, CosmicError
-from cosmic.frame.operation import Task
+from cosmic.frame.operation import Operation, Task
 from cosmic.vico.api.coordinate_transform import CalibrationShown
 from cosmic.vico.core.image import CameraImage, Circumstances
+from cosmic.vico.core.measuring.corrections import Corrections
 from cosmic.vico.core.vision.tool_tips import HeldSeen
 from cosmic.vico.hw.interface import (
     CameraCounters,
@@ -196,6 +197,17 @@ class FakeCamera:
         self._do(*call)
         self.task = Task(title)
         return self.task
+
+    def corrections(self, image: CameraImage) -> Operation[Corrections]:
+        """Fail, or end at once with one fibre."""
+        operation: Operation[Corrections] = Operation("fibres")
+        if self.refuse:
+            operation.fail(CosmicError(self.refuse))
+        else:
+            corrections = Corrections(image.data)
+            corrections.add([(100.0, 100.0), (400.0, 100.0)], 10.0)
+            operation.finish(corrections)
+        return operation
 
     # commands
 

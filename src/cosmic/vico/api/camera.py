@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from typing_extensions import override
 
@@ -15,7 +16,7 @@ from cosmic.frame.file_names import space_left
 from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.network.caller import called_remotely
 from cosmic.frame.network.transport import Rule
-from cosmic.frame.operation import Task
+from cosmic.frame.operation import Operation, Task
 from cosmic.frame.renamed import Renamed
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.camera_coordinates import CameraCoordinates
@@ -45,6 +46,9 @@ from cosmic.vico.hw.interface import (
 )
 
 BACKGROUND_FRAMES = 8
+
+if TYPE_CHECKING:
+    from cosmic.vico.core.measuring.corrections import Corrections
 
 
 @checked_class
@@ -320,6 +324,22 @@ class CameraHandle(CameraCoordinates, CameraShape, Declared):
     def analysis(self) -> Seen | None:
         """The newest result; None while nothing is on."""
         return self._images.analysis if any(each.on for each in self._links) else None
+
+    def corrections(self, image: CameraImage) -> "Operation[Corrections]":
+        """Begin to find the fibres on an image, for an operator to correct them.
+
+        The operation fails with `NotAvailable` where they cannot be looked for.
+        """
+
+        def find() -> "Corrections":
+            from cosmic.vico.core.measuring.corrections import Corrections
+            from cosmic.vico.core.vision.finding import find_fibres
+
+            # Files have blue first, and corrections belong to the pixels of a file.
+            pixels = image.data[:, :, ::-1] if image.data.ndim == 3 else image.data
+            return Corrections(pixels, find_fibres(pixels))
+
+        return self._images.jobs.submit(find, f"Fibres of {self.name}")
 
     # Files
 

@@ -11,6 +11,7 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import (
+    ConfigError,
     CosmicError,
     DeviceError,
     DeviceFault,
@@ -90,6 +91,7 @@ class CameraThread(WorkerThread):
         self._running = False
         self._problem = ""
         self._settings: CameraSettings | None = None
+        self._kept: tuple[str, CameraSettings] | None = None
         self._ranges: CameraRanges | None = None
         self._last_id: int | None = None
         self._reopen = False
@@ -194,7 +196,7 @@ class CameraThread(WorkerThread):
                 self._settings = camera.configure(settings)
             else:
                 self._restart(camera, settings, before)
-            self._ranges = camera.ranges
+            self._keep(camera)
             self._shown = None  # it was taken with other settings
             logger.info("%s takes images with %s", self.name, self._settings)
 
@@ -271,8 +273,8 @@ class CameraThread(WorkerThread):
         self._reopen = False
         self._close()
         self._camera = camera = self._open_camera()
-        self._settings = camera.configure(self._prepare(camera))
-        self._ranges = camera.ranges
+        self._settings = self._as_before(camera)
+        self._keep(camera)
         logger.info("%s: %s %s connected", self.name, camera.info.vendor, camera.info.model)
         if self._wanted_running:
             self._begin(camera)
@@ -286,6 +288,22 @@ class CameraThread(WorkerThread):
             frame = camera.receive(LOOK_S)
             if frame is not None:
                 self._hand_on(frame, camera.settings)
+
+    def _as_before(self, camera: Camera) -> CameraSettings:
+        """Put in force what was before a camera was lost, or what `prepare` says of a new one."""
+        kept = self._kept
+        if kept is not None and kept[0] == camera.info.key:
+            try:
+                return camera.configure(kept[1])
+            except ConfigError as exc:
+                logger.warning("%s: came back, and refuses what was in force: %s", self.name, exc)
+        return camera.configure(self._prepare(camera))
+
+    def _keep(self, camera: Camera) -> None:
+        """Note what is in force, for the case that the camera is lost and comes back."""
+        self._ranges = camera.ranges
+        if self._settings is not None:
+            self._kept = camera.info.key, self._settings
 
     def _begin(self, camera: Camera) -> None:
         self._last_id = None

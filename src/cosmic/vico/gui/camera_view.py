@@ -23,6 +23,7 @@ from cosmic.vico.gui.calibrate_menu import CalibrateButton
 from cosmic.vico.gui.camera_chooser import CameraChooser
 from cosmic.vico.gui.chain_panel import ChainPanel
 from cosmic.vico.gui.contrast_panel import ContrastPanel
+from cosmic.vico.gui.correct_button import CorrectButton
 from cosmic.vico.gui.ghost_layer import GhostLayer
 from cosmic.vico.gui.image_tools import ImageTools
 from cosmic.vico.gui.image_view import CameraImageView
@@ -112,6 +113,7 @@ class CameraView(QWidget):
         self.ghost = GhostLayer()
         self.row, self.status = ToolRow(), StatusRow(self._camera)
         self.calibrate = self.row.add(CalibrateButton(self._camera))
+        self.correct = self.row.add(CorrectButton(self._camera, lambda: self.view.image, now=now))
         self.contrast, self.chain = ContrastPanel(), ChainPanel(self._camera)
         self.form = SettingsForm(self._camera, self)
         self.chooser = CameraChooser(vico, name)
@@ -219,7 +221,7 @@ class CameraView(QWidget):
         self.contrast.levels_changed.connect(view.set_levels)
         self.contrast.marks_changed.connect(view.set_marks)
         view.pointed.connect(self._on_pointed)
-        for messages in (self.calibrate.message, self.tools.message):
+        for messages in (self.calibrate.message, self.correct.message, self.tools.message):
             messages.connect(self.say)
         self.tools.region_chosen.connect(self.form.read_part)
 
