@@ -233,6 +233,20 @@ def _add_analysis_commands(
     recompute.add_argument(
         "--apply", action="store_true", help="put the new values into record, report and table"
     )
+    size = commands.add_parser(
+        "sample-size", help="how many good fibres make the mean as precise as wanted"
+    )
+    size.add_argument("folder", type=Path, nargs="?", metavar="FOLDER", help="spread of a campaign")
+    size.add_argument("--spread", type=float, metavar="SD", help="sd of ln(EI) between fibres")
+    size.add_argument(
+        "--shared-percent", type=float, metavar="P", help="half of the 95 %% interval all share"
+    )
+    size.add_argument(
+        "--precision",
+        type=lambda text: (float(text),),
+        metavar="P",
+        help="half of the wanted 95 %% interval, in per cent",
+    )
 
 
 def _add_simulate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -325,6 +339,8 @@ def _add_procedure_commands(
     campaign.add_argument("recipe", type=Path, metavar="RECIPE", help="a file, or a shipped name")
     campaign.add_argument("--out", type=Path, required=True, metavar="FOLDER")
     campaign.add_argument("--seed", type=int, help="seed of the simulation")
+    plate = commands.add_parser("plate", help="confirm the plate that a running campaign asks for")
+    plate.add_argument("folder", type=Path, metavar="FOLDER", help="of the campaign")
     calibrate = commands.add_parser(
         "calibrate",
         help="renew expired calibrations, without a window",

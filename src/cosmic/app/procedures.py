@@ -6,6 +6,7 @@ from pathlib import Path
 
 from cosmic.app.platform import Platform, stopped_since
 from cosmic.app.provenance import commit, provenance_of
+from cosmic.app.twin_plates import TwinPlates
 from cosmic.autonomy.calibrating.registry import CalibrationRegistry
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.opening import CampaignHost, open_campaign, read_recipe
@@ -13,6 +14,7 @@ from cosmic.autonomy.campaign.recipe import Recipe
 from cosmic.autonomy.campaign.records import TWIN
 from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.autonomy.handling.context import Applications, HandlingContext
+from cosmic.autonomy.handling.plate_change import PlateHandler
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.shipped.calibrate import build_calibrate
@@ -24,12 +26,18 @@ from cosmic.vico.api.application import VicoApplication
 
 @checked
 def campaign_on(
-    rig: Applications, platform: Platform, recipe: Recipe | str | Path, folder: str | Path
+    rig: Applications,
+    platform: Platform,
+    recipe: Recipe | str | Path,
+    folder: str | Path,
+    plates: PlateHandler | None = None,
 ) -> Campaign:
     """Return a campaign that is ready to start; see `Rig.campaign`."""
     for name, value in (("recipe", recipe), ("folder", folder)):
         if not isinstance(value, Recipe):
             check_path(name, value)
+    if plates is None and platform.scene is not None:
+        plates = TwinPlates(platform.scene, platform.clock)
     read = recipe if isinstance(recipe, Recipe) else read_recipe(Path(recipe))
     host = CampaignHost(
         rig=rig,
@@ -46,6 +54,7 @@ def campaign_on(
             "commit": commit() or "unknown",
         },
         provenance=provenance_of(platform, read),
+        plates=plates,
     )
     return open_campaign(read, Path(folder), host)
 

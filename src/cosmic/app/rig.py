@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from cosmic.autonomy.campaign.recipe import Recipe
     from cosmic.autonomy.handling.context import HandlingContext
     from cosmic.autonomy.handling.marked import MarkedFibre
+    from cosmic.autonomy.handling.plate_change import PlateHandler
     from cosmic.autonomy.handling.settings import HandlingSettings
     from cosmic.autonomy.recorded.steps import RecordedProcedure
     from cosmic.autonomy.shipped.fibre_handling import FibreHandling
@@ -119,7 +120,13 @@ class Rig:
             f"platform file. Others that are: {there}"
         )
 
-    def campaign(self, recipe: "Recipe | str | Path", folder: str | Path) -> "Campaign":
+    def campaign(
+        self,
+        recipe: "Recipe | str | Path",
+        folder: str | Path,
+        *,
+        plates: "PlateHandler | None" = None,
+    ) -> "Campaign":
         """Return a campaign that is ready to start: many fibres by one recipe.
 
         In a folder that holds a campaign by the same recipe it goes on with that one. It ends when
@@ -131,6 +138,8 @@ class Rig:
             A file, or the name of a recipe that ships with CoSMic, such as "bend-test".
         folder : path
             Where records are kept; made where it is not there.
+        plates : PlateHandler, optional
+            What puts further plates on the table; a person does if None, and the twin by itself.
 
         Raises
         ------
@@ -147,7 +156,7 @@ class Rig:
             raise NotAvailable("an operation on a fibre is running; wait until it has ended")
         if self.running == A_CAMPAIGN:
             raise NotAvailable("a campaign is running; end it first")
-        campaign = campaign_on(self, self._platform, recipe, folder)
+        campaign = campaign_on(self, self._platform, recipe, folder, plates)
         self._runs.add(campaign)
         return campaign
 

@@ -281,6 +281,11 @@ class Scene:
         self._truth.record(self.clock.now_s(), "end")
         self._truth.close()
 
+    @property
+    def plate(self) -> int:
+        """How many plates were put there after the first."""
+        return self._plate
+
     def change_plate(self) -> int:
         """Put another plate with new fibres there, at once, and return its number, from 1 on.
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from PySide6.QtPdf import QPdfDocument
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.campaign.output import write_pdf
@@ -23,6 +24,22 @@ def test_a_campaign_is_printed_with_its_figures(tmp_path: Path, qtbot: QtBot) ->
     assert b"bend test" in whole or "bend test".encode("utf-16-be") in whole
     assert whole.count(b"/Type /Page\n") > empty.count(b"/Type /Page\n") >= 1
     assert whole.count(b"/Subtype /Image") > empty.count(b"/Subtype /Image")
+
+
+def test_no_page_ends_with_a_heading(tmp_path: Path, qtbot: QtBot) -> None:
+    with CampaignStore.create(tmp_path / "run", INFO) as store:
+        for number in range(1, 4):
+            store.finish_fibre(good(store.begin_fibre(time_s=0.0), seed=number))
+        write_pdf(store, tmp_path / "report.pdf")
+    document = QPdfDocument()
+    document.load(str(tmp_path / "report.pdf"))
+    headings = {"Distribution", "Fibres", "Time of the operations", "Calibration", "Made with"}
+    last = [
+        document.getAllText(page).text().strip().split("\r\n")[-1]
+        for page in range(document.pageCount())
+    ]
+    assert len(last) > 4
+    assert not headings.intersection(last)
 
 
 def test_a_path_that_cannot_be_written_is_reported(tmp_path: Path, qtbot: QtBot) -> None:

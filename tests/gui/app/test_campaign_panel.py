@@ -47,6 +47,7 @@ class StoredCampaign:
         self.work = Work()
         self.run = None
         self.end_reason, self.operation, self.left_s = "", "", float("nan")
+        self.request = ""
 
     @property
     def over(self) -> bool:
@@ -69,6 +70,9 @@ class StoredCampaign:
 
     def start(self) -> None:
         self.phase, self.end_reason = CampaignPhase.ENDED, "2 fibres done"
+
+    def confirm_plate(self) -> None:
+        self.request = ""
 
     def pause(self) -> None:
         self.phase, self.end_reason = CampaignPhase.PAUSED, ""
@@ -103,6 +107,20 @@ def panel(qtbot, tmp_path: Path, opened) -> Iterator[CampaignPanel]:
 
 def press(qtbot, button) -> None:
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+
+
+def test_a_plate_that_is_waited_for_is_asked_for_and_confirmed(panel, qtbot, tmp_path) -> None:
+    panel.folder.setText(str(tmp_path / "plates"))
+    press(qtbot, panel.procedure.start)
+    assert not panel.plate.isVisibleTo(panel)
+    panel.campaign.request = "put plate 2 on the table, and confirm it"
+    panel.refresh()
+    assert panel.plate.isVisibleTo(panel)
+    assert "plate 2" in panel.message.toolTip()
+    press(qtbot, panel.plate)
+    panel.refresh()
+    assert panel.campaign.request == ""
+    assert not panel.plate.isVisibleTo(panel)
 
 
 def test_a_campaign_that_cannot_begin_says_why_and_nothing_runs(panel, qtbot, tmp_path) -> None:

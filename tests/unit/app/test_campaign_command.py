@@ -61,6 +61,7 @@ def platforms(monkeypatch: pytest.MonkeyPatch, qapp: object) -> SimpleNamespace:
         made.worlds.append(world)
         campaign = SimpleNamespace(
             phase=made.phase, over=True, end_reason="so it was", operation="", left_s=math.nan,
+            plan="", request="",
             shortfall=made.shortfall,
             progress=progress((), 3.0), start=lambda: made.start(), join=lambda: None,
         )  # fmt: skip

@@ -14,9 +14,11 @@ from cosmic.app.panels.campaign.output import gui_application, write_output
 from cosmic.app.stations.address import endpoints_of
 from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.opening import read_recipe, recorded
+from cosmic.autonomy.campaign.plates import confirmed
 from cosmic.autonomy.campaign.recipe import Recipe
 from cosmic.autonomy.campaign.records import TWIN
 from cosmic.frame.clock import WALL
+from cosmic.frame.errors import CosmicError
 from cosmic.frame.log import set_up_logging
 from cosmic.frame.platform_services import ending_signals
 
@@ -103,15 +105,32 @@ class Bar:
         self._length = 0
         self._done = -1
         self._share = 0.0
+        self._asked = ""
 
     def follow(self) -> None:
         """Write until the campaign is over."""
         while not self._campaign.over:
             self._write()
+            self._ask()
             WALL.sleep(_EVERY_S)
         self._write()
         if self._terminal.isatty():
             self._terminal.write("\n")
+
+    def _ask(self) -> None:
+        """Say once what a person is asked for, and take it as done when `cosmic plate` says so."""
+        request, asked = self._campaign.request, self._asked
+        self._asked = request
+        if not request:
+            return
+        folder = self._campaign.store.folder
+        if request != asked:
+            self._terminal.write(f"\n{request}: cosmic plate {folder}\n")
+        if confirmed(folder):
+            try:
+                self._campaign.confirm_plate()
+            except CosmicError as exc:
+                self._terminal.write(f"\n{exc}\n")
 
     def _write(self) -> None:
         now = self._campaign.progress
@@ -134,6 +153,8 @@ class Bar:
         parts.append(f"{now.done} fibres, {now.good} good, {now.failed} failed")
         if now.done:
             parts.append(f"{now.good_per_hour:.0f} good an hour")
+        if plan := self._campaign.plan:
+            parts.append(plan)
         if not math.isnan(left_s):
             parts.append(f"{left_s / 60.0:.0f} min left")
         parts.append(self._campaign.operation or str(self._campaign.phase))

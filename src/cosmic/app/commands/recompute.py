@@ -10,6 +10,7 @@ from cosmic.app.panels.campaign.output import gui_application, write_output
 from cosmic.autonomy.campaign.analysis import (
     Analysis,
     Comparison,
+    altered_files,
     analyse,
     compare,
     finish,
@@ -22,11 +23,14 @@ from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
 
 CHANGED: Final = 3
+ALTERED: Final = 4
 MOST_LINES: Final = 40
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Analyse a campaign anew and return the exit code: 3 where a number differs.
+
+    It is 4 where only images or the files that it was made with are not as they were written.
 
     Raises
     ------
@@ -39,12 +43,16 @@ def run(chosen: argparse.Namespace) -> int:
     if chosen.recipe is not None:
         recipe = load_recipe(chosen.recipe)
         settings = settings_in(recipe.text, str(recipe.path))
+    altered = altered_files(reader)
     analysis = analyse(reader, settings)
     found = compare(reader, analysis)
-    sys.stdout.write("\n".join(lines_of(found, analysis)) + "\n")
+    lines = [*lines_of(found, analysis), *(f"not as it was written: {each}" for each in altered)]
+    sys.stdout.write("\n".join(lines) + "\n")
     if chosen.apply:
         _apply(chosen.folder, analysis)
-    return CHANGED if found.changed else 0
+    if not found.same:
+        return CHANGED
+    return ALTERED if altered else 0
 
 
 def _apply(folder: Path, analysis: Analysis) -> None:
@@ -69,10 +77,14 @@ def lines_of(found: Comparison, analysis: Analysis) -> list[str]:
             trust = ", trusted now" if each.trusted_now else ", no longer trusted"
         lines.append(
             f"  fibre {each.number}: {each.before_n_m2:.6g} -> {each.now_n_m2:.6g} N m2 "
-            f"({each.percent:+.3f} %){trust}"
+            f"({each.percent:+.3f} %), ±{each.half_before_percent:.2f} -> "
+            f"±{each.half_now_percent:.2f} %{trust}"
         )
     if len(found.changed) > MOST_LINES:
         lines.append(f"  and {len(found.changed) - MOST_LINES} more")
+    if found.missing:
+        numbers = ", ".join(map(str, found.missing))
+        lines.append(f"  in the record, and not in the raw files: fibre {numbers}")
     lines += [f"another version: {each}" for each in found.versions]
     lines.append(f"scale of the force: {scale_words(analysis.scale)}")
     return lines

@@ -114,6 +114,12 @@ class Campaigns(Declared):
 
     @property
     @state
+    def request(self) -> str:
+        """What a person is asked for, such as another plate; empty for nothing."""
+        return "" if self._campaign is None else self._campaign.request
+
+    @property
+    @state
     def end_reason(self) -> str:
         """Why it ended; empty before."""
         return "" if self._campaign is None else self._campaign.end_reason
@@ -209,6 +215,17 @@ class Campaigns(Declared):
     def resume(self) -> None:
         """Go on after a pause; harmless when it does not pause."""
         self._present().resume()
+
+    @command(moves=True)
+    def confirm_plate(self) -> None:
+        """Say that the plate is on the table which `request` asks for.
+
+        Raises
+        ------
+        NotAvailable
+            None was asked for, or it cannot be there.
+        """
+        self._present().confirm_plate()
 
     @command(at_once=True)
     def abort(self, reason: str = "ended by a program") -> None:

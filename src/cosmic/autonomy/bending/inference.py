@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import chdtrc, ndtr
 
 from cosmic.autonomy.bending.response import Response
-from cosmic.autonomy.bending.result import Contribution, Floats, Kind, SpanFit
+from cosmic.autonomy.bending.result import COMMON_SOURCES, Contribution, Floats, Kind, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
 
 DEPTHS: Final = 36
@@ -491,17 +491,8 @@ def budget_of(
         _line("stiffness along the fibre", Kind.B, variation, "", _root(weights, varied)),
     ]
     stds = np.sqrt(np.diag(common.covariance))
-    words = (
-        "scale of the force",
-        "drift of the scale",
-        "friction",
-        "jaws and sensor give way",
-        "place of the probe's edge",
-        "cross-talk",
-        "probe gives way aside",
-    )
     units = ("", "", "", "um/uN", "um", "", "")
-    for number, (name, unit) in enumerate(zip(words, units, strict=True)):
+    for number, (name, unit) in enumerate(zip(COMMON_SOURCES, units, strict=True)):
         # What goes together is shared among both by its covariance.
         part = float(by[number] * (common.covariance[number] @ by))
         lines.append((name, Kind.B, float(stds[number]), unit, float(by[number]), max(part, 0.0)))

@@ -43,6 +43,18 @@ class Quality(StrEnum):
     NOT_A_FIBRE = "not a fibre"
 
 
+COMMON_SOURCES: Final = (
+    "scale of the force",
+    "drift of the scale",
+    "friction",
+    "jaws and sensor give way",
+    "place of the probe's edge",
+    "cross-talk",
+    "probe gives way aside",
+)
+"""Contributions to the budget that all fibres of a campaign share, in the order of the fit."""
+
+
 class Kind(StrEnum):
     """How a contribution to the uncertainty is known, after GUM."""
 
@@ -72,6 +84,11 @@ class Contribution:
     unit: str
     sensitivity: float
     share: float
+
+    @property
+    def common(self) -> bool:
+        """Whether it is the same for all fibres of a campaign: their mean does not lessen it."""
+        return self.source in COMMON_SOURCES
 
 
 @renamed_fields(ways_correlation="branches_correlation")

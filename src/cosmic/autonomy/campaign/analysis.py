@@ -16,8 +16,21 @@ from cosmic.autonomy.bending.fit import assess_campaign, in_time, measure_fibre
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.standards import ForceScale, StandardReading
-from cosmic.autonomy.campaign.records import STANDARD, CampaignError, FibreRecord
-from cosmic.autonomy.campaign.storage_format import FINAL, RawFibre, fitted_file, read_raw
+from cosmic.autonomy.campaign.provenance import changed_files
+from cosmic.autonomy.campaign.records import (
+    FIBRE,
+    STANDARD,
+    CampaignError,
+    FibreRecord,
+    Outcome,
+)
+from cosmic.autonomy.campaign.storage_format import (
+    FIBRES,
+    FINAL,
+    RawFibre,
+    fitted_file,
+    read_raw,
+)
 from cosmic.autonomy.campaign.store import CampaignStore, write_whole
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.handling.push import certificate_of
@@ -242,13 +255,21 @@ def _number(value: object) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What an analysis makes otherwise of a fibre than its record has it."""
+    """What an analysis makes otherwise of a fibre than its record has it.
+
+    Attributes
+    ----------
+    half_before_percent, half_now_percent : float
+        Half of the 95 % interval, of the value.
+    """
 
     number: int
     before_n_m2: float
     now_n_m2: float
     trusted_before: bool
     trusted_now: bool
+    half_before_percent: float = math.nan
+    half_now_percent: float = math.nan
 
     @property
     def percent(self) -> float:
@@ -270,12 +291,20 @@ class Comparison:
         What of the program is another one than then, in words.
     scale_percent : float
         By how much the sensor's scale is taken to be another one.
+    missing : tuple of int
+        Fibres with a value in the record and none in the raw files.
     """
 
     compared: int
     changed: tuple[Change, ...]
     versions: tuple[str, ...]
     scale_percent: float
+    missing: tuple[int, ...] = ()
+
+    @property
+    def same(self) -> bool:
+        """Whether the record says what its raw files do."""
+        return not self.changed and not self.missing
 
 
 def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
@@ -294,22 +323,82 @@ def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
     changed = tuple(
         change for record, result in pairs if (change := _change(record, result)) is not None
     )
-    return Comparison(len(pairs), changed, versions, 100.0 * (analysis.scale.off_part - off))
+    missing = tuple(
+        number
+        for number, record in records.items()
+        if record.bending is not None and number not in analysis.results
+    )
+    percent = 100.0 * (analysis.scale.off_part - off)
+    return Comparison(len(pairs), changed, versions, percent, missing)
+
+
+def altered_files(reader: CampaignReader) -> tuple[str, ...]:
+    """Return what of a folder, beside raw curves, is not as it was written, in words.
+
+    These are images, copies of the files that it was made with, and raw files that belong to no
+    fibre of the record.
+
+    Raises
+    ------
+    CampaignError
+        The campaign cannot be read.
+    """
+    known = {path for path, _ in reader.raw_files().values()}
+    known |= {reader.folder / file for file in reader.unfinished_files()}
+    strangers = [
+        f"{path.relative_to(reader.folder).as_posix()} belongs to no fibre of the record"
+        for path in sorted((reader.folder / FIBRES).glob("*.h5"))
+        if path not in known
+    ]
+    images = [
+        f"{file}: {'is missing' if not path.exists() else 'its SHA-256 differs'}"
+        for file, sha256 in reader.image_files().items()
+        if _digest(path := reader.folder / file) != sha256
+    ]
+    copies = [f"{each}: its copy differs or is missing" for each in changed_files(reader.folder)]
+    return (*strangers, *images, *copies)
+
+
+def _digest(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return ""
 
 
 def _change(record: FibreRecord, now: BendingResult) -> Change | None:
     before = record.bending
     if before is None:
-        return Change(record.number, math.nan, now.ei_n_m2, False, now.trusted)
+        return Change(
+            record.number,
+            math.nan,
+            now.ei_n_m2,
+            trusted_before=False,
+            trusted_now=now.trusted,
+            half_now_percent=_half_percent(now),
+        )
     pairs = (
         (before.ei_n_m2, now.ei_n_m2),
         (before.ei_low_n_m2, now.ei_low_n_m2),
         (before.ei_high_n_m2, now.ei_high_n_m2),
     )
+    said = record.outcome is Outcome.GOOD if record.role == FIBRE else before.trusted
     same = all(_same(*pair) for pair in pairs) and before.trusted == now.trusted
-    if same:
+    if same and not (said and not now.trusted):
         return None
-    return Change(record.number, before.ei_n_m2, now.ei_n_m2, before.trusted, now.trusted)
+    return Change(
+        record.number,
+        before.ei_n_m2,
+        now.ei_n_m2,
+        trusted_before=before.trusted or said,
+        trusted_now=now.trusted,
+        half_before_percent=_half_percent(before),
+        half_now_percent=_half_percent(now),
+    )
+
+
+def _half_percent(result: BendingResult) -> float:
+    return 50.0 * (result.ei_high_n_m2 - result.ei_low_n_m2) / result.ei_n_m2
 
 
 def _same(one: float, other: float) -> bool:

@@ -10,6 +10,7 @@ from threading import Condition
 from typing import Final
 
 from cosmic.autonomy.campaign.analysis import finish
+from cosmic.autonomy.campaign.plates import CampaignPlates
 from cosmic.autonomy.campaign.recipe import Recipe
 from cosmic.autonomy.campaign.recorder import FibreRecorder, skip_known
 from cosmic.autonomy.campaign.records import FibreRecord
@@ -75,11 +76,14 @@ class Treatment:
         A fibre without a result is no good one.
     standard : Procedure or None
         Measures the standard and puts it back; None: there is none.
+    plates : CampaignPlates or None
+        Has further plates put there; None: the campaign ends with the fibres of the first.
     """
 
     procedure: Procedure[HandlingContext]
     measures: bool = True
     standard: Procedure[HandlingContext] | None = None
+    plates: CampaignPlates | None = None
 
 
 class Campaign:
@@ -143,6 +147,7 @@ class Campaign:
             work.settings.standard.at if treatment.standard is not None else ()
         )
         work.shared.enough = self._enough
+        self._note_plate()
 
     # State
 
@@ -186,6 +191,11 @@ class Campaign:
         return self._shortfall
 
     @property
+    def request(self) -> str:
+        """What a person is asked for, such as another plate; empty for nothing."""
+        return "" if self._treatment.plates is None else self._treatment.plates.request
+
+    @property
     def unfinished(self) -> bool:
         """True when it is over and could be gone on with: what the recipe asks for is not done."""
         return self.over and self._phase is not CampaignPhase.ENDED
@@ -196,6 +206,11 @@ class Campaign:
         if self.over:
             return 0.0 if self._phase is CampaignPhase.ENDED else math.nan
         return self._rule.left_s(self.progress)
+
+    @property
+    def plan(self) -> str:
+        """How many fibres make the mean as precise as wanted, in words; empty: unknown."""
+        return self._rule.plan(self.progress)
 
     @property
     def fibres(self) -> tuple[FibreRecord, ...]:
@@ -268,6 +283,19 @@ class Campaign:
             self._phase = CampaignPhase.PAUSING
             run = self._run
         run.step()
+
+    def confirm_plate(self) -> None:
+        """Say that the plate is there which `request` asks for.
+
+        Raises
+        ------
+        NotAvailable
+            None was asked for, or it cannot be there.
+        """
+        if self._treatment.plates is None:
+            raise NotAvailable("no plate is waited for")
+        self._treatment.plates.confirm()
+        self._publish()
 
     def abort(self, reason: str = "ended by the operator") -> None:
         """End it at once: what moves is cancelled, then it is made safe; returns at once."""
@@ -345,8 +373,8 @@ class Campaign:
             )
 
     def _treat_all(self) -> str:
-        if self._known is not None:
-            skip_known(self.work, self._known)
+        if reason := self._go_on():
+            return reason
         while True:
             self._rest()
             if self._abort is not None:
@@ -363,6 +391,17 @@ class Campaign:
                 if self._abort is None and self._stopped() is None:
                     self._measure_last_standard()
                 return reason
+
+    def _go_on(self) -> str:
+        """Have all as an earlier run left it; returns why the campaign ends instead."""
+        if self._known is None:
+            return ""
+        skip_known(self.work, self._known)
+        plates = self._treatment.plates
+        if plates is None:
+            return ""
+        plates.restore()
+        return self._put_plate(plates) if plates.pending else ""
 
     @property
     def _share(self) -> float:
@@ -443,7 +482,7 @@ class Campaign:
             return str(failure)
         self._record_finished()
         if failure.cause == NONE_LEFT:
-            return str(failure)
+            return self._worked_off(str(failure))
         if len(self.work.shared.finished) > taken:
             return ""
         held = [each for each in self.work.arms if each.fibre is not None]
@@ -456,6 +495,32 @@ class Campaign:
         if self._stuck >= MOST_STUCK:
             return f"{self._stuck} fibres in a row were not released; the last: {failure}"
         return ""
+
+    def _worked_off(self, text: str) -> str:
+        """Have the next plate put there; returns why the campaign ends instead."""
+        plates = self._treatment.plates
+        if plates is None:
+            return text
+        self._recorder.worked_off = plates.number
+        if self._rule.reason(self.progress):
+            return ""  # seen where the campaign goes on, after the standard that may be due
+        if reason := plates.why_no_other(self.fibres):
+            return f"{reason}; {text}"
+        return self._put_plate(plates)
+
+    def _put_plate(self, plates: CampaignPlates) -> str:
+        failure = self._carry_through(plates.change(self.store, self.work.clock.now_s()))
+        if failure is not None:
+            return str(failure)
+        plates.there(self.store, self.work.clock.now_s())
+        self._note_plate()
+        self._standards.new_plate()
+        return ""
+
+    def _note_plate(self) -> None:
+        if self._treatment.plates is not None:
+            self._recorder.plate = self._treatment.plates.number
+            self._recorder.worked_off = self._recorder.plate - 1
 
     def _enter(self, phase: CampaignPhase) -> CampaignPhase:
         """Enter another phase; returns the one before."""

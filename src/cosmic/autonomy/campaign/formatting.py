@@ -3,6 +3,7 @@
 import math
 from typing import Final
 
+from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.standards import ForceScale
 from cosmic.autonomy.campaign.records import FibreRecord, Shape
 from cosmic.autonomy.campaign.statistics import MeanEi
@@ -10,6 +11,9 @@ from cosmic.autonomy.campaign.statistics import MeanEi
 EI_UNIT: Final = 1e-12
 EI_LABEL: Final = "10⁻¹² N m²"
 NONE: Final = "–"
+LEAST_SHARE: Final = 0.005
+"""Of the variance: contributions with less stand together in one line."""
+
 TWO_SIDED: Final = 1.96
 """Standard deviations in half of a 95 % interval."""
 
@@ -91,3 +95,27 @@ def when(iso: str) -> str:
 def outcome_words(record: FibreRecord) -> str:
     """Return how a fibre ended, with the cause."""
     return f"{record.outcome}: {record.cause}" if record.cause else str(record.outcome)
+
+
+def combined_std(result: BendingResult) -> float:
+    """Return the combined standard uncertainty of ln(EI) by the budget."""
+    return math.sqrt(sum((line.std * line.sensitivity) ** 2 for line in result.budget))
+
+
+def budget_rows(result: BendingResult) -> list[tuple[str, ...]]:
+    """Return the budget of a stiffness as rows of text; contributions too small to see in one."""
+    shown = [line for line in result.budget if line.share >= LEAST_SHARE]
+    rows: list[tuple[str, ...]] = [
+        (
+            line.source,
+            line.kind.value,
+            f"{number(line.std, 3)} {line.unit.replace('um', 'µm').replace('uN', 'µN')}".strip(),
+            f"{line.sensitivity:.3g}",
+            f"{100.0 * line.share:.1f}",
+        )
+        for line in shown
+    ]
+    rest = sum(line.share for line in result.budget) - sum(line.share for line in shown)
+    if result.budget and len(shown) < len(result.budget):
+        rows.append(("all others", "", "", "", f"{100.0 * max(rest, 0.0):.1f}"))
+    return rows

@@ -4,9 +4,11 @@ from collections.abc import Callable, Collection, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
 from cosmic.autonomy.campaign.campaign import Campaign, Treatment
+from cosmic.autonomy.campaign.plates import CampaignPlates
 from cosmic.autonomy.campaign.provenance import Provenance, write_provenance
 from cosmic.autonomy.campaign.recipe import Recipe, asks_the_same, load_recipe
 from cosmic.autonomy.campaign.records import TWIN, CampaignError, CampaignInfo
@@ -15,6 +17,7 @@ from cosmic.autonomy.campaign.storage_format import DATABASE
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.handling.context import Applications, HandlingContext, vision_of
+from cosmic.autonomy.handling.plate_change import PlateByPerson, PlateHandler
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.shipped.registry import PARAMETERS, PROCEDURES, ShippedProcedure
@@ -40,6 +43,8 @@ class CampaignHost:
         Of everything random in the twin that runs: what is recorded, whatever the recipe says.
     world : str
         The twin's; empty on hardware.
+    plates : PlateHandler or None
+        What puts further plates on the table; None: a person does.
     sample : str
         What lies on the twin's plate.
     provenance : Provenance
@@ -56,6 +61,7 @@ class CampaignHost:
     sample: str = ""
     provenance: Provenance = field(default_factory=Provenance)
     world: str = ""
+    plates: PlateHandler | None = None
 
 
 def read_recipe(path: Path) -> Recipe:
@@ -121,6 +127,7 @@ def open_campaign(recipe: Recipe, folder: Path, host: CampaignHost) -> Campaign:
                 shipped.build(settings),
                 measures=shipped.measures,
                 standard=_standard(shipped, settings),
+                plates=_plates(recipe, host, shipped, settings, known),
             ),
             recipe,
             store,
@@ -138,6 +145,28 @@ def _standard(
     if shipped.standard is None or not settings.standard.ei_n_m2 > 0.0:
         return None
     return shipped.standard(settings)
+
+
+def _plates(
+    recipe: Recipe,
+    host: CampaignHost,
+    shipped: ShippedProcedure,
+    settings: HandlingSettings,
+    known: ResumePlan | None,
+) -> CampaignPlates | None:
+    most = recipe.file.stop.plates
+    if most is None:
+        return None
+    handler = host.plates
+    if handler is None or recipe.file.plates.by == "person":
+        handler = PlateByPerson(handler)
+    return CampaignPlates(
+        most,
+        handler,
+        partial(shipped.change_plate, settings),
+        number=1 if known is None else known.plate,
+        pending=known is not None and known.plate_pending,
+    )
 
 
 def _store(

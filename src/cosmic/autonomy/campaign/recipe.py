@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from pydantic import Field, field_validator
 
@@ -59,6 +59,19 @@ class SensorSettings(StrictModel):
     calibrated: str = ""
 
 
+class PlateSettings(StrictModel):
+    """How plates are changed, where `stop.plates` asks for several.
+
+    Attributes
+    ----------
+    by : str
+        "handler": by what the platform has for it, and by a person where it has nothing.
+        "person": somebody puts each plate there and confirms it.
+    """
+
+    by: Literal["handler", "person"] = "handler"
+
+
 class OutputSettings(StrictModel):
     """What is kept and made besides the records."""
 
@@ -97,6 +110,7 @@ class RecipeFile(StrictModel):
     climate: ClimateSettings = ClimateSettings()
     sensor: SensorSettings = SensorSettings()
     stop: StopSettings
+    plates: PlateSettings = PlateSettings()
     parameters: dict[str, Any] = Field(default_factory=dict)
     output: OutputSettings = OutputSettings()
     twin: TwinChoice = TwinChoice()

@@ -22,6 +22,7 @@ from cosmic.autonomy.campaign.records import (
     Pose,
     Series,
     Shape,
+    Sighting,
     Value,
 )
 from cosmic.autonomy.campaign.resume import FELL, DroppedFibre, KnownFibre, ResumePlan
@@ -32,6 +33,7 @@ from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Reach
 from cosmic.autonomy.handling.prepare import is_known
 from cosmic.autonomy.handling.put_away import ToBin
+from cosmic.autonomy.handling.survey import sighted
 from cosmic.autonomy.procedures.times import OperationTimes
 from cosmic.autonomy.procedures.tree import ENDS, OPERATION, NodeEvent, NodeState
 from cosmic.daqco.api.daqco import Daqco
@@ -327,12 +329,21 @@ class FibreRecorder:
         The procedure measures: a fibre without a result is no good one.
     images : bool
         Keep the images.
+
+    Attributes
+    ----------
+    plate : int
+        The one that is there, from 1 on.
+    worked_off : int
+        Plates on which no fibre is left that can be taken.
     """
 
     def __init__(
         self, work: HandlingContext, store: CampaignStore, *, measures: bool, images: bool
     ) -> None:
         self.store = store
+        self.plate = 1
+        self.worked_off = 0
         self.times = OperationTimes()
         self.fibres: tuple[FibreRecord, ...] = store.reader.fibres()
         self._work = work
@@ -346,12 +357,14 @@ class FibreRecorder:
         self._events: dict[str, list[NodeEvent]] = {}
         self._begun: dict[str, HeldFibre] = {}
         self._in_work: tuple[TreatedFibre, ...] = ()
+        self._surveys = 0
+        self._sighted = {each.plate for each in store.reader.sightings()}
 
     def progress(self) -> CampaignProgress:
         """Return how the campaign stands; any thread."""
         now_s = self._work.clock.now_s() if self._ended_s is None else self._ended_s
         elapsed_s = self._before_s + now_s - self._began_s
-        return progress(self.fibres, elapsed_s)
+        return progress(self.fibres, elapsed_s, self.worked_off)
 
     @property
     def in_work(self) -> tuple[HeldFibre, ...]:
@@ -372,6 +385,7 @@ class FibreRecorder:
         """
         self._events.setdefault(event.role, []).append(event)
         self.times.note(event)
+        self._keep_sightings()
         self._begin_fibres()
         if event.kind == OPERATION and event.state is NodeState.RUNNING:
             self._journal.fibre = self._number_of(event.role)
@@ -379,6 +393,17 @@ class FibreRecorder:
 
     def _number_of(self, role: str) -> int | None:
         return next((each.number for each in self._in_work if each.fibre.arm == role), None)
+
+    def _keep_sightings(self) -> None:
+        if self._surveys == self._work.shared.surveys:
+            return
+        self._surveys = self._work.shared.surveys
+        if self.plate in self._sighted:
+            return
+        self._sighted.add(self.plate)
+        self.store.keep_sightings(
+            self.plate, [_sighting(self.plate, each) for each in sighted(self._work)]
+        )
 
     def _begin_fibres(self) -> None:
         for arm in self._work.arms:
@@ -393,6 +418,7 @@ class FibreRecorder:
                 time_s=fibre.found_s,
                 length_um=candidate.length_um,
                 role=STANDARD if fibre.standard else FIBRE,
+                plate=self.plate,
             )
             self._in_work = (*self._in_work, TreatedFibre(fibre, number))
 
@@ -458,6 +484,13 @@ class FibreRecorder:
             ]
         )
         self.store.end(reason, time_s=self._ended_s)
+
+
+def _sighting(plate: int, candidate: Candidate) -> Sighting:
+    x, y = candidate.position_um
+    return Sighting(
+        plate, x, y, candidate.length_um, candidate.width_um, candidate.curl, candidate.problem
+    )
 
 
 def _made_words(work: HandlingContext, name: str) -> str:

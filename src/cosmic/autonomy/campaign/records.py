@@ -161,6 +161,8 @@ class FibreRecord:
         "fibre", or "standard": one of those is no fibre of the sample.
     elapsed_s : float
         When it was found, since the campaign began, all runs together.
+    plate : int
+        On which it lay, from 1 on.
     """
 
     number: int
@@ -182,11 +184,64 @@ class FibreRecord:
     series: tuple[Series, ...] = ()
     role: str = FIBRE
     elapsed_s: float = math.nan
+    plate: int = 1
 
     @property
     def duration_s(self) -> float:
         """How long it took."""
         return self.ended_s - self.began_s
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """What the first survey of a plate saw of one fibre.
+
+    Attributes
+    ----------
+    plate : int
+        From 1 on.
+    x_plate_um, y_plate_um : float
+        Its middle.
+    problem : str
+        Why it could not be taken as it lay, such as "crossing"; empty: it could.
+    """
+
+    plate: int
+    x_plate_um: float
+    y_plate_um: float
+    length_um: float
+    width_um: float
+    curl: float
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PlateChange:
+    """A change of the plate.
+
+    Attributes
+    ----------
+    plate : int
+        Number of the one that is put there, from 2 on.
+    run : int
+        Start of the program in which it was asked for.
+    asked_s, put_s : float
+        When it was asked for and when it was there, on the clock of that run; `put_s` is nan where
+        nobody has said so.
+    by : str
+        Who puts it there.
+    """
+
+    plate: int
+    run: int
+    asked_s: float
+    put_s: float = math.nan
+    by: str = ""
+
+    @property
+    def over(self) -> bool:
+        """Whether it is known that the plate is there."""
+        return math.isfinite(self.put_s)
 
 
 @dataclass(frozen=True, slots=True)

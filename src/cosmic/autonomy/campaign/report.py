@@ -22,8 +22,9 @@ from cosmic.autonomy.bending.standards import ForceScale
 from cosmic.autonomy.campaign.analysis import scale_in
 from cosmic.autonomy.campaign.formatting import (
     EI_LABEL,
-    EI_UNIT,
     NONE,
+    budget_rows,
+    combined_std,
     duration,
     interval,
     mean_words,
@@ -36,7 +37,10 @@ from cosmic.autonomy.campaign.formatting import (
     with_interval,
 )
 from cosmic.autonomy.campaign.provenance import read_provenance
+from cosmic.autonomy.campaign.rates import CampaignRates, rates_of, seen_fibres
 from cosmic.autonomy.campaign.records import (
+    FINISHED,
+    STANDARD,
     TWIN,
     CalibrationNote,
     CampaignError,
@@ -45,11 +49,28 @@ from cosmic.autonomy.campaign.records import (
     FibreRecord,
     Outcome,
 )
-from cosmic.autonomy.campaign.snapshot import SpanCurve, span_curves
-from cosmic.autonomy.campaign.statistics import CampaignProgress, MeanEi, progress
+from cosmic.autonomy.campaign.report_figures import (
+    FEW,
+    OperationTime,
+    distribution_figure,
+    force_figure,
+    operation_bars,
+    operation_times,
+    residual_figure,
+    stiffness_figure,
+)
+from cosmic.autonomy.campaign.selection import Selection, selection_of
+from cosmic.autonomy.campaign.statistics import (
+    TWO_SIDED,
+    CampaignProgress,
+    MeanEi,
+    fibres_needed,
+    progress,
+    share_interval,
+)
 from cosmic.autonomy.campaign.store import CampaignStore, write_whole
 from cosmic.autonomy.campaign.store_read import CampaignReader
-from cosmic.autonomy.campaign.svg_plot import BLUE, GREY, INK, ORANGE, Axis, Plot, around, bars
+from cosmic.autonomy.campaign.svg_plot import bars
 
 ShowSvg = Callable[[str, int], str]
 """Returns the element that shows an SVG, so many pixels wide."""
@@ -62,24 +83,7 @@ IMAGE_PX: Final = 360
 ASPECT: Final = 4.0 / 3.0
 ROOM: Final = 1.5
 """How much more of the image is shown than what it is about."""
-PALE: Final = "#9dbfdc"
-FEW: Final = 8
-"""Fewer fibres are drawn one by one."""
-LEAST_SHARE: Final = 0.005
-SHORTEST_S: Final = 0.05
-"""Of an operation that is drawn."""
-
-
-@dataclass(frozen=True, slots=True)
-class OperationTime:
-    """How long an operation takes, over all its tries."""
-
-    name: str
-    tries: int
-    failed: int
-    median_s: float
-    p95_s: float
-    total_s: float
+PRECISIONS_PERCENT: Final = (5.0, 10.0, 20.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +92,10 @@ class ReportData:
 
     Attributes
     ----------
-    finished : tuple of FibreRecord
-        Without curves and images.
+    finished, standards : tuple of FibreRecord
+        Fibres, and measurements of the standard, without curves and images.
+    analysis : mapping
+        What the final analysis was done with; empty where there was none.
     whole : callable
         Returns a fibre with them, by its number: they are not all held at once.
     """
@@ -97,7 +103,11 @@ class ReportData:
     info: CampaignInfo
     ended: tuple[str, str]
     progress: CampaignProgress
+    rates: CampaignRates
+    selection: Selection
     finished: tuple[FibreRecord, ...]
+    standards: tuple[FibreRecord, ...]
+    analysis: Mapping[str, Any]
     calibrations: tuple[CalibrationNote, ...]
     operations: tuple[OperationTime, ...]
     scale: ForceScale | None
@@ -137,18 +147,28 @@ def report_data(reader: CampaignReader) -> ReportData:
     """
     reader.check()
     fibres, finished = reader.fibres(), reader.finished()
+    standards = tuple(each for each in reader.fibres(STANDARD) if each.outcome in FINISHED)
+    stands = progress(fibres, reader.elapsed_s())
     return ReportData(
         info=reader.info(),
         ended=reader.ended(),
-        progress=progress(fibres, reader.elapsed_s()),
+        progress=stands,
+        rates=rates_of(reader),
+        selection=selection_of(
+            seen_fibres(reader.sightings(), fibres),
+            [each for each in finished if each.outcome is Outcome.GOOD],
+            common_std_ln=stands.mean.common_std_ln,
+        ),
         finished=finished,
+        standards=standards,
+        analysis=reader.analysis(),
         calibrations=reader.calibrations(),
         operations=operation_times(finished),
         scale=scale_in(reader.analysis()),
         runs=read_provenance(reader.folder),
         raw=reader.raw_files(),
         folder=reader.folder,
-        whole=lambda number: _whole(reader, number, finished),
+        whole=lambda number: _whole(reader, number, (*finished, *standards)),
     )
 
 
@@ -159,27 +179,6 @@ def _whole(reader: CampaignReader, number: int, finished: Sequence[FibreRecord])
     except CampaignError as exc:
         record = next(each for each in finished if each.number == number)
         return replace(record, text=f"{record.text} {exc}".strip())
-
-
-def operation_times(fibres: Sequence[FibreRecord]) -> tuple[OperationTime, ...]:
-    """Return the time of each operation, in the order of their first appearance."""
-    took: dict[str, list[float]] = {}
-    failed: dict[str, int] = {}
-    for fibre in fibres:
-        for each in fibre.operations:
-            took.setdefault(each.name, []).append(each.ended_s - each.began_s)
-            failed[each.name] = failed.get(each.name, 0) + each.failed
-    return tuple(
-        OperationTime(
-            name=name,
-            tries=len(times),
-            failed=failed[name],
-            median_s=float(np.median(times)),
-            p95_s=float(np.quantile(times, 0.95)),
-            total_s=float(np.sum(times)),
-        )
-        for name, times in took.items()
-    )
 
 
 @cache
@@ -220,12 +219,19 @@ def _render(template: str, data: ReportData, *, svg: ShowSvg, png: ShowPng) -> s
             distribution=drawn(distribution_figure(good, data.progress.mean) if good else "", 640),
             few=len(good) < FEW,
             fibre_rows=[_fibre_row(each) for each in data.finished],
+            rate_rows=_rate_rows(data),
+            problem_rows=[tuple(map(str, each)) for each in data.selection.problems],
+            class_rows=_class_rows(data.selection),
+            weighted=mean_words(data.selection.weighted),
+            unknown=data.selection.unknown,
+            missing=f"{100.0 * data.selection.missing_part:.0f}",
             failures=drawn(bars("Failures by cause", causes) if causes else "", 430),
-            operation_bars=drawn(_operation_bars(data), 560),
+            operation_bars=drawn(operation_bars(data.operations, data.progress.done), 560),
             operation_rows=[_operation_row(each) for each in data.operations],
             record_rows=_record_rows(data),
             file_rows=_file_rows(data),
             standard_rows=_standard_rows(data.scale),
+            standard_words=_standard_words(data),
             calibration_rows=[_calibration_row(each) for each in data.calibrations],
             cards=_cards(data, svg, png),
             versions=sorted(data.info.versions.items()),
@@ -261,11 +267,12 @@ def _summary(data: ReportData) -> list[tuple[str, str]]:
             f"{now.failed} failed",
         ),
         ("Interrupted by a program exit", str(now.interrupted)),
+        ("Good of those tried", _part(data.rates, data.rates.tried)),
         ("Good fibres an hour", number(now.good_per_hour)),
-        ("Success", f"{number(now.success_percent)} %"),
         ("Median time of a fibre", duration(now.cycle_s)),
         (f"Geometric mean of EI, {EI_LABEL} (95 %)", mean_words(now.mean)),
         ("Spread between fibres", _spread(now.mean.spread_ln)),
+        ("Good fibres for a mean known to", _plan(now.mean)),
         ("Scale of the force", _scale_words(data)),
         ("Mean length, width, curl", _shape(data.finished)),
     ]
@@ -274,6 +281,63 @@ def _summary(data: ReportData) -> list[tuple[str, str]]:
         if info.world:
             rows.insert(4, ("World of the twin", info.world))
     return rows
+
+
+def _part(rates: CampaignRates, of: int) -> str:
+    """Return good ones of so many, with the 95 % interval of the share (Wilson's)."""
+    if not of:
+        return NONE
+    low, high = share_interval(rates.good, of)
+    return f"{rates.good} of {of}: {100.0 * rates.part(of):.0f} % ({low:.0f} to {high:.0f} %)"
+
+
+def _plan(mean: MeanEi) -> str:
+    if mean.count < 2:
+        return NONE
+    wanted = ((each, fibres_needed(mean, each)) for each in PRECISIONS_PERCENT)
+    words = [f"±{each:g} %: {'no number' if math.isinf(n) else f'{n:.0f}'}" for each, n in wanted]
+    shared = 100.0 * TWO_SIDED * mean.common_std_ln
+    return f"{'; '.join(words)} (±{shared:.1f} % is shared by all and does not average out)"
+
+
+def _rate_rows(data: ReportData) -> list[tuple[str, str]]:
+    rates = data.rates
+    rows = []
+    if rates.seen:
+        rows = [
+            ("Good of the fibres seen on the plates", _part(rates, rates.seen)),
+            ("Good of those that could be grasped", _part(rates, rates.graspable)),
+        ]
+    rows.append(("Good of those tried", _part(rates, rates.tried)))
+    return [
+        *rows,
+        ("Plates", str(rates.plates)),
+        ("Treatment of fibres", _share_of_time(rates.fibres_s, rates)),
+        ("Standards", _share_of_time(rates.standards_s, rates)),
+        ("Preparation, calibration, surveys", _share_of_time(rates.preparation_s, rates)),
+        ("Changes of the plate", _share_of_time(rates.plates_s, rates)),
+        ("Good an hour, everything counted", number(rates.an_hour)),
+        ("Good an hour without changes of the plate", number(rates.an_hour_without_plates)),
+        ("Good an hour of treatment alone", number(rates.an_hour_of_treatment)),
+    ]
+
+
+def _share_of_time(part_s: float, rates: CampaignRates) -> str:
+    share = 100.0 * part_s / rates.elapsed_s if rates.elapsed_s > 0.0 else math.nan
+    return f"{duration(part_s)}, {number(share)} %"
+
+
+def _class_rows(selection: Selection) -> list[tuple[str, ...]]:
+    return [
+        (
+            f"{each.from_um:.0f} to {each.to_um:.0f}",
+            str(each.seen),
+            str(each.graspable),
+            str(each.good),
+            number(each.weight, 2),
+        )
+        for each in selection.classes
+    ]
 
 
 def _spread(spread_ln: float) -> str:
@@ -344,8 +408,13 @@ def _record_rows(data: ReportData) -> list[tuple[str, str]]:
     ]
     named = [f"{key} {value}" for key, value in sensor.items() if value]
     software = last.get("software", {})
+    analysis = data.analysis.get("versions", {})
     return [
         ("Runs", str(len(data.runs))),
+        (
+            "Analysis",
+            f"{analysis.get('analysis', 'unknown')}, made {data.analysis.get('made', NONE)}",
+        ),
         ("Climate", ", ".join(air) or "not read"),
         ("Force sensor", ", ".join(named) or "not named"),
         ("Commit", str(software.get("commit") or "unknown")),
@@ -362,25 +431,6 @@ def _file_rows(data: ReportData) -> list[tuple[str, str]]:
         return []
     files = data.runs[-1].get("files", {})
     return [(name, kept["sha256"]) for name, kept in files.items() if "copy" in kept]
-
-
-def budget_rows(result: BendingResult) -> list[tuple[str, ...]]:
-    """Return the budget of a stiffness as rows of text; contributions too small to see in one."""
-    shown = [line for line in result.budget if line.share >= LEAST_SHARE]
-    rows: list[tuple[str, ...]] = [
-        (
-            line.source,
-            line.kind.value,
-            f"{number(line.std, 3)} {line.unit.replace('um', 'µm').replace('uN', 'µN')}".strip(),
-            f"{line.sensitivity:.3g}",
-            f"{100.0 * line.share:.1f}",
-        )
-        for line in shown
-    ]
-    rest = sum(line.share for line in result.budget) - sum(line.share for line in shown)
-    if result.budget and len(shown) < len(result.budget):
-        rows.append(("all others", "", "", "", f"{100.0 * max(rest, 0.0):.1f}"))
-    return rows
 
 
 def _scale_words(data: ReportData) -> str:
@@ -400,6 +450,17 @@ def _standard_rows(scale: ForceScale | None) -> list[tuple[str, ...]]:
         )
         for order, each in enumerate(scale.standards, 1)
     ]
+
+
+def _standard_words(data: ReportData) -> str:
+    kept = data.analysis.get("standard", {})
+    if not kept.get("ei_n_m2"):
+        return ""
+    number_of = f", certificate {kept['certificate']}" if kept.get("certificate") else ""
+    return (
+        f"Its certified stiffness is {stiffness(kept['ei_n_m2'])} {EI_LABEL} with an expanded "
+        f"uncertainty of {kept['expanded_percent']:g} % (k = 2){number_of}."
+    )
 
 
 def _span_rows(result: BendingResult) -> list[tuple[str, ...]]:
@@ -429,22 +490,44 @@ class _Card:
     record: FibreRecord
     raw: str
     sha256: str
+    title: str
+    words: str
+    combined: str
     figures: list[Markup]
     span_rows: list[tuple[str, ...]]
     budget_rows: list[tuple[str, ...]]
 
 
 def _cards(data: ReportData, svg: ShowSvg, png: ShowPng) -> Iterator[_Card]:
-    for each in data.finished:
+    titles = {each.number: f"Standard, measurement {n}" for n, each in enumerate(data.standards, 1)}
+    for each in (*data.finished, *data.standards):
         record = data.whole(each.number)
         figures = [_shown(image, png) for image in record.images[:2]]
         drawn = force_figure(record), stiffness_figure(record), residual_figure(record)
         figures += [Markup(svg(figure, 430)) for figure in drawn if figure]
         rows = [] if record.bending is None else _span_rows(record.bending)
-        budget = [] if record.bending is None else budget_rows(record.bending)
+        # Of a standard the stiffness is known, and the scale is what is measured.
+        owns = record.bending if record.role != STANDARD else None
+        budget = [] if owns is None else budget_rows(owns)
         path, sha256 = data.raw.get(each.number, (None, ""))
         raw = "" if path is None else path.relative_to(data.folder).as_posix()
-        yield _Card(record, raw, sha256, figures, rows, budget)
+        yield _Card(
+            record=record,
+            raw=raw,
+            sha256=sha256,
+            title=titles.get(record.number, f"Fibre {record.number}"),
+            words=_standing(record),
+            combined=NONE if owns is None else number(combined_std(owns), 3),
+            figures=figures,
+            span_rows=rows,
+            budget_rows=budget,
+        )
+
+
+def _standing(record: FibreRecord) -> str:
+    if record.role == STANDARD:
+        return "measured" if record.bending is not None else outcome_words(record)
+    return outcome_words(record)
 
 
 def _shown(image: FibreImage, png: ShowPng) -> Markup:
@@ -476,144 +559,3 @@ def _cut(image: FibreImage) -> npt.NDArray[Any]:
     columns = slice(max(0, round(x)), max(1, round(x + wide)))
     part = pixels[rows, columns]
     return part if part.size else pixels
-
-
-# ---------------------------------------------------------------- figures
-
-
-def force_figure(record: FibreRecord) -> str:
-    """Return force over push of all spans of a fibre: measured out and back, and fitted."""
-    curves = span_curves(record)
-    if not curves:
-        return ""
-    probes = np.concatenate([each.probe_um for each in curves])
-    forces = np.concatenate([each.force_un for each in curves])
-    x = Axis("push beyond the first contact, µm", *around(float(probes.min()), float(probes.max())))
-    y = Axis("force, µN", *around(float(forces.min()), float(forces.max())))
-    plot = Plot(x, y, f"Force over push of fibre {record.number}")
-    for curve in curves:
-        _draw(plot, curve)
-    return plot.svg()
-
-
-def _operation_bars(data: ReportData) -> str:
-    done = max(data.progress.done, 1)
-    rows = [
-        (each.name, each.total_s / done, f"{each.total_s / done:.1f} s")
-        for each in data.operations
-        if each.total_s / done >= SHORTEST_S
-    ]
-    return (
-        bars("Time of each operation, for one fibre", rows, width=560.0) if data.operations else ""
-    )
-
-
-def _draw(plot: Plot, curve: SpanCurve) -> None:
-    probe, force, fitted = curve.probe_um, curve.force_un, curve.fitted_un
-    for branch in (curve.loading, ~curve.loading):
-        shown = branch & np.isfinite(fitted)
-        order = np.argsort(probe[shown])
-        if shown.any():
-            plot.line(probe[shown][order].tolist(), fitted[shown][order].tolist(), GREY)
-    back = ~curve.loading
-    plot.points(probe[back].tolist(), force[back].tolist(), ORANGE, hollow=True)
-    plot.points(probe[curve.loading].tolist(), force[curve.loading].tolist(), BLUE)
-    last = int(np.argmax(probe))
-    plot.note(float(probe[last]), float(force[last]), f"{curve.place_um:.0f} µm", end=True)
-
-
-def residual_figure(record: FibreRecord) -> str:
-    """Return what the model leaves of the force over the push, of all spans of a fibre."""
-    curves = [each for each in span_curves(record) if np.isfinite(each.fitted_un).any()]
-    if not curves:
-        return ""
-    left = [each.force_un - each.fitted_un for each in curves]
-    highest = max(float(np.nanmax(np.abs(each))) for each in left)
-    pushes = np.concatenate([each.probe_um for each in curves])
-    x = Axis("push beyond the first contact, µm", *around(float(pushes.min()), float(pushes.max())))
-    y = Axis("force less model, µN", -1.1 * highest - 1e-6, 1.1 * highest + 1e-6)
-    plot = Plot(x, y, f"Residuals of fibre {record.number}", height=180.0)
-    plot.line([x.low, x.high], [0.0, 0.0], GREY)
-    for curve, away in zip(curves, left, strict=True):
-        for branch, colour in ((curve.loading, BLUE), (~curve.loading, ORANGE)):
-            shown = branch & np.isfinite(away)
-            plot.points(
-                curve.probe_um[shown].tolist(),
-                away[shown].tolist(),
-                colour,
-                hollow=colour == ORANGE,
-            )
-    return plot.svg()
-
-
-def stiffness_figure(record: FibreRecord) -> str:
-    """Return k^(-1/3) over the position, with the line whose slope is the bending stiffness."""
-    result = record.bending
-    if result is None:
-        return ""
-    fits = [each for each in result.spans if each.k_un_um > 0.0]
-    if not fits or not result.ei_n_m2 > 0.0:
-        return ""
-    positions = [each.place_um for each in fits]
-    roots = [each.k_un_um ** (-1.0 / 3.0) for each in fits]
-    slope = (3.0 * result.ei_n_m2 * 1e18) ** (-1.0 / 3.0)
-    begin, end = -result.clamp_offset_um, max(positions) * 1.05
-    x = Axis("position of the probe from the tip of the jaws, µm", *around(min(begin, 0.0), end))
-    y = Axis("k^(-1/3), (µN/µm)^(-1/3)", 0.0, 1.1 * max(*roots, slope * (end - begin)))
-    plot = Plot(x, y, f"Stiffness of the spans of fibre {record.number}")
-    plot.line([begin, end], [0.0, slope * (end - begin)], GREY)
-    for index, (position, root) in enumerate(zip(positions, roots, strict=True)):
-        plot.points([position], [root], BLUE, hollow=index not in result.used)
-    plot.note(begin + 0.16 * (end - begin), 0.06 * y.high, "clamp, where the line begins")
-    return plot.svg()
-
-
-def distribution_figure(results: Sequence[BendingResult], mean: MeanEi) -> str:
-    """Return the distribution of stiffnesses on a logarithmic axis; of few, each with its interval.
-
-    Across the top the 95 % interval of their mean.
-    """
-    values = np.array([each.ei_n_m2 for each in results]) / EI_UNIT
-    logs = np.log(values)
-    few = len(values) < FEW
-    bins = max(4, min(16, round(1.5 * math.sqrt(len(values)))))
-    room = max(0.12, 0.5 * float(np.ptp(logs)) / bins)
-    low, high = float(logs.min()) - room, float(logs.max()) + room
-    if few and mean.count >= 2:
-        # The mean of few is known badly: its interval is shown as far as it does not hide them.
-        low = min(low, max(math.log(mean.ei_low_n_m2 / EI_UNIT) - room, low - 1.0))
-        high = max(high, min(math.log(mean.ei_high_n_m2 / EI_UNIT) + room, high + 1.0))
-    edges = np.linspace(low, high, bins + 1)
-    counts, _ = np.histogram(logs, edges)
-    top = len(values) + 0.8 if few else 1.15 * float(counts.max())
-    x = Axis(f"bending stiffness, {EI_LABEL}", math.exp(edges[0]), math.exp(edges[-1]), log=True)
-    y = Axis("good fibres in order" if few else "fibres", 0.0, top, whole=True)
-    plot = Plot(x, y, "Distribution of bending stiffness", width=640.0, height=280.0)
-    if few:
-        for index, each in enumerate(results, 1):
-            ends = _inside(x, each.ei_low_n_m2, each.ei_high_n_m2)
-            plot.line(ends, [float(index)] * 2, BLUE)
-            plot.points([each.ei_n_m2 / EI_UNIT], [float(index)], BLUE)
-    else:
-        for count, first, last in zip(counts, edges[:-1], edges[1:], strict=True):
-            if count:
-                plot.box(math.exp(first + 0.01), math.exp(last - 0.01), 0.0, float(count), PALE)
-        _bell(plot, mean, len(values) * (edges[1] - edges[0]))
-        plot.points(values.tolist(), [0.02 * top] * len(values), BLUE)
-    if mean.count >= 2:
-        plot.line(_inside(x, mean.ei_low_n_m2, mean.ei_high_n_m2), [0.96 * top] * 2, ORANGE)
-    return plot.svg()
-
-
-def _inside(axis: Axis, low_n_m2: float, high_n_m2: float) -> list[float]:
-    return [max(low_n_m2 / EI_UNIT, axis.low), min(high_n_m2 / EI_UNIT, axis.high)]
-
-
-def _bell(plot: Plot, mean: MeanEi, area: float) -> None:
-    """Draw the lognormal distribution with a mean and spread."""
-    if not mean.spread_ln > 0.0:
-        return
-    at = np.linspace(math.log(plot.x.low), math.log(plot.x.high), 120)
-    away = (at - math.log(mean.ei_n_m2 / EI_UNIT)) / mean.spread_ln
-    high = np.exp(-0.5 * away**2) * area / (mean.spread_ln * math.sqrt(2.0 * math.pi))
-    plot.line(np.exp(at).tolist(), np.minimum(high, plot.y.high).tolist(), INK)

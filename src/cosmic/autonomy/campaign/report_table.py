@@ -39,6 +39,7 @@ COLUMNS: Final = (
     "trusted",
     "flags",
     "reasons",
+    "plate",
 )
 
 
@@ -113,4 +114,5 @@ def _row(record: FibreRecord) -> dict[str, Value]:
         "trusted": False if result is None else result.trusted,
         "flags": "" if result is None else "; ".join(sorted(result.flags)),
         "reasons": "" if result is None else "; ".join(result.reasons),
+        "plate": record.plate,
     }

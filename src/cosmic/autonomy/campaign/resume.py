@@ -58,6 +58,10 @@ class ResumePlan:
         Finished fibres that lie on the plate again; one like each of them is skipped.
     cut_off : bool
         The run before ended without a word, as when the program is killed.
+    plate : int
+        The one that is there, from 1 on.
+    plate_pending : bool
+        It was asked for, and nobody knows whether it is there.
     """
 
     finished: int
@@ -66,6 +70,8 @@ class ResumePlan:
     last: tuple[JournalEntry, ...]
     fallen: tuple[DroppedFibre, ...] = ()
     cut_off: bool = False
+    plate: int = 1
+    plate_pending: bool = False
 
     def is_done(self, pose: Pose, length_um: float) -> bool:
         """Return whether the fibre found there has been treated already."""
@@ -82,13 +88,19 @@ def resume(store: CampaignStore) -> ResumePlan:
     """
     interrupted = store.interrupt_running()
     fibres = store.reader.fibres()
+    changes = store.reader.plate_changes()
+    plate = max((each.plate for each in changes), default=1)
+    pending = any(not each.over for each in changes if each.plate == plate)
+    here = [each for each in fibres if each.plate == plate]
     return ResumePlan(
         finished=sum(each.outcome in FINISHED for each in fibres),
         interrupted=tuple(interrupted),
-        known=_known(fibres),
+        known=_known(here),
         last=store.reader.journal(JOURNAL_LINES),
-        fallen=_fallen(fibres, store.reader.phase(FELL)),
+        fallen=_fallen(here, store.reader.phase(FELL)),
         cut_off=store.reader.cut_off(),
+        plate=plate,
+        plate_pending=pending,
     )
 
 

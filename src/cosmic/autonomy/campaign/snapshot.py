@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from cosmic.autonomy.bending.result import BendingResult, SpanFit
 from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.campaign.formatting import budget_rows
 from cosmic.autonomy.campaign.records import FibreImage, FibreRecord, Floats, Outcome, Shape
 from cosmic.autonomy.campaign.statistics import CampaignProgress, MeanEi, mean_ei
 
@@ -202,6 +203,8 @@ class FibreCardData:
         What makes the result doubtful, in a few words and in sentences.
     uncertainty : str
         Where its interval comes from, and whether the scale of the force is verified.
+    budget : tuple of tuple of str
+        The budget of its stiffness: contribution, kind, uncertainty, sensitivity, share.
     curves : tuple of SpanCurve
         Its spans.
     images : tuple of FibreImage
@@ -224,6 +227,7 @@ class FibreCardData:
     flags: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     uncertainty: str = ""
+    budget: tuple[tuple[str, ...], ...] = ()
     curves: tuple[SpanCurve, ...] = ()
     images: tuple[FibreImage, ...] = ()
     failures: tuple[tuple[str, str], ...] = ()
@@ -247,6 +251,7 @@ def card_of(record: FibreRecord) -> FibreCardData:
         flags=() if result is None else tuple(sorted(str(each) for each in result.flags)),
         doubts=() if result is None else result.reasons,
         uncertainty=_uncertainty(result),
+        budget=() if result is None else tuple(budget_rows(result)),
         curves=span_curves(record, most_points=MOST_CURVE_POINTS),
         images=record.images,
         failures=tuple((each.name, each.cause) for each in record.operations if each.failed),

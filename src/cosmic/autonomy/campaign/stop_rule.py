@@ -7,7 +7,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from cosmic.autonomy.campaign.statistics import CampaignProgress
+from cosmic.autonomy.campaign.statistics import TWO_SIDED, CampaignProgress, fibres_needed
 from cosmic.frame.config import StrictModel
 
 
@@ -22,6 +22,9 @@ class StopSettings(StrictModel):
         Good fibres.
     time_s : float
         On the platform's clock.
+    plates : int
+        Plates on which no fibre is left that can be taken: each but the last is changed for the
+        next.
     precision_percent : float
         Half of the 95 % interval of the mean stiffness.
     least : int
@@ -31,16 +34,17 @@ class StopSettings(StrictModel):
     count: int | None = Field(None, ge=1)
     good: int | None = Field(None, ge=1)
     time_s: float | None = Field(None, gt=0.0)
+    plates: int | None = Field(None, ge=1, le=10_000)
     precision_percent: float | None = Field(None, gt=0.0, le=100.0)
     least: int = Field(10, ge=2)
 
     @model_validator(mode="after")
     def _one_at_least(self) -> Self:
-        rules = (self.count, self.good, self.time_s, self.precision_percent)
+        rules = (self.count, self.good, self.time_s, self.plates, self.precision_percent)
         if all(each is None for each in rules):
             raise ValueError(
-                "give at least one of count, good, time_s and precision_percent: without any the "
-                "campaign would end with the last fibre only"
+                "give at least one of count, good, time_s, plates and precision_percent: without "
+                "any the campaign would end with the last fibre only"
             )
         return self
 
@@ -60,11 +64,27 @@ class StopRule:
             return f"{now.good} good fibres"
         if rules.time_s is not None and now.elapsed_s >= rules.time_s:
             return f"{now.elapsed_s:.0f} s have passed"
+        if rules.plates is not None and now.plates >= rules.plates:
+            return f"{now.plates} {'plate' if now.plates == 1 else 'plates'} worked off"
         found = now.mean.precision_percent
         precise = rules.precision_percent is not None and found <= rules.precision_percent
         if precise and now.mean.count >= rules.least:
             return f"mean stiffness known to +/-{found:.1f} %"
         return ""
+
+    def plan(self, now: CampaignProgress) -> str:
+        """Return how many fibres make the mean as precise as wanted, in words; empty: unknown."""
+        wanted = self.settings.precision_percent
+        if wanted is None or now.mean.count < 2:
+            return ""
+        needed = fibres_needed(now.mean, wanted)
+        if math.isinf(needed):
+            shared = 100.0 * TWO_SIDED * now.mean.common_std_ln
+            return (
+                f"no number of fibres makes the mean known to ±{wanted:g} %: what all share, such "
+                f"as the scale of the force, is uncertain by ±{shared:.1f} %"
+            )
+        return f"about {max(needed, self.settings.least):.0f} good fibres for ±{wanted:g} %"
 
     def left_s(self, now: CampaignProgress) -> float:
         """Return the time until the first rule is met, as far as can be told; nan: it cannot."""
@@ -77,14 +97,16 @@ class StopRule:
             times.append(max(rules.good - now.good, 0) * good_cycle)
         if rules.time_s is not None:
             times.append(max(rules.time_s - now.elapsed_s, 0.0))
+        if rules.plates is not None and now.plates:
+            times.append((rules.plates - now.plates) * now.elapsed_s / now.plates)
         if rules.precision_percent is not None:
-            wanted = max(_needed(now, rules.precision_percent), rules.least)
+            wanted = max(fibres_needed(now.mean, rules.precision_percent), rules.least)
             times.append(max(wanted - now.good, 0.0) * good_cycle)
-        known_s = [each for each in times if not math.isnan(each)]
+        known_s = [each for each in times if math.isfinite(each)]
         return min(known_s) if known_s else math.nan
 
 
-BEGIN, MIDDLE, END = "begin", "middle", "end"
+BEGIN, MIDDLE, END, PLATE = "begin", "middle", "end", "plate"
 
 
 class StandardSchedule:
@@ -93,11 +115,17 @@ class StandardSchedule:
     Parameters
     ----------
     at : sequence of str
-        Of "begin", "middle" and "end", those that are wanted.
+        Of "begin", "middle", "end" and "plate", which is each further plate, those that are wanted.
     """
 
     def __init__(self, at: Sequence[str]) -> None:
-        self._left = list(at)
+        self._left = [each for each in at if each != PLATE]
+        self._each_plate = PLATE in at
+
+    def new_plate(self) -> None:
+        """Note that another plate is there."""
+        if self._each_plate and PLATE not in self._left:
+            self._left.append(PLATE)
 
     def due(self, share: float, *, ending: bool) -> str:
         """Return what is due when a part of the campaign is over; empty: nothing."""
@@ -105,14 +133,10 @@ class StandardSchedule:
             return BEGIN
         if ending:
             return END if END in self._left else ""
+        if PLATE in self._left:
+            return PLATE
         return MIDDLE if MIDDLE in self._left and share >= 0.5 else ""
 
     def done(self, due: str) -> None:
         """Note that it was measured, or tried."""
         self._left.remove(due)
-
-
-def _needed(now: CampaignProgress, precision_percent: float) -> float:
-    """Return how many good fibres make the mean so precise, by the spread so far."""
-    half = math.log1p(precision_percent / 100.0)
-    return math.ceil((1.96 * now.mean.spread_ln / half) ** 2) if now.mean.count >= 2 else math.nan

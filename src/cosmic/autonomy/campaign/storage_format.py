@@ -71,7 +71,7 @@ CREATE TABLE fibre (
     budget_json TEXT NOT NULL DEFAULT '[]', scale_verified INTEGER NOT NULL DEFAULT 0,
     notes TEXT NOT NULL DEFAULT '', role TEXT NOT NULL DEFAULT 'fibre',
     file_sha256 TEXT NOT NULL DEFAULT '', online_ei_n_m2 REAL,
-    online_outcome TEXT NOT NULL DEFAULT ''
+    online_outcome TEXT NOT NULL DEFAULT '', plate INTEGER NOT NULL DEFAULT 1
 );
 CREATE TABLE span (
     fibre INTEGER NOT NULL REFERENCES fibre, number INTEGER NOT NULL,
@@ -99,6 +99,19 @@ CREATE TABLE journal (
 );
 """
 
+LATER_TABLES: Final = """
+CREATE TABLE IF NOT EXISTS plate (
+    number INTEGER PRIMARY KEY, run INTEGER NOT NULL REFERENCES run,
+    asked_s REAL NOT NULL, put_s REAL, put_by TEXT NOT NULL DEFAULT ''
+);
+CREATE TABLE IF NOT EXISTS sighting (
+    plate INTEGER NOT NULL, number INTEGER NOT NULL, x_plate_um REAL, y_plate_um REAL,
+    length_um REAL, width_um REAL, curl REAL, problem TEXT NOT NULL DEFAULT '',
+    PRIMARY KEY (plate, number)
+);
+"""
+"""Tables that a campaign begun with an earlier program does not have."""
+
 
 ADDED: Final = {
     "campaign": {
@@ -114,6 +127,7 @@ ADDED: Final = {
         "file_sha256": "TEXT NOT NULL DEFAULT ''",
         "online_ei_n_m2": "REAL",
         "online_outcome": "TEXT NOT NULL DEFAULT ''",
+        "plate": "INTEGER NOT NULL DEFAULT 1",
     },
 }
 """Columns that a campaign begun with an earlier program does not have."""
@@ -274,6 +288,7 @@ def fibre_record(row: Row, spans: Sequence[Row], operations: Sequence[Row]) -> F
         bending=None if row["trusted"] is None else _result(row, spans),
         operations=tuple(_operation(each) for each in operations),
         role=str(row.get("role", FIBRE)),
+        plate=int(number(row.get("plate", 1))),
     )
 
 
@@ -335,12 +350,19 @@ def _operation(row: Row) -> OperationRecord:
 
 
 def add_columns(connection: sqlite3.Connection) -> None:
-    """Give the tables of a campaign begun with an earlier program the columns they lack."""
+    """Give a campaign begun with an earlier program the tables and columns it lacks."""
+    for statement in statements(LATER_TABLES):
+        connection.execute(statement)
     for table, columns in ADDED.items():
         there = {row[1] for row in connection.execute(f"PRAGMA table_info({table})")}
         for name, kind in columns.items():
             if name not in there:
                 connection.execute(f"ALTER TABLE {table} ADD COLUMN {name} {kind}")
+
+
+def statements(text: str) -> list[str]:
+    """Return the statements of a text of SQL, one by one."""
+    return [each for each in text.split(";") if each.strip()]
 
 
 def insert(connection: sqlite3.Connection, table: str, row: Row) -> None:

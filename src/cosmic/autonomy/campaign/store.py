@@ -26,11 +26,13 @@ from cosmic.autonomy.campaign.records import (
     FibreRecord,
     Outcome,
     Pose,
+    Sighting,
     Value,
 )
 from cosmic.autonomy.campaign.storage_format import (
     DATABASE,
     FIBRES,
+    LATER_TABLES,
     SCHEMA_VERSION,
     TABLES,
     Row,
@@ -43,6 +45,7 @@ from cosmic.autonomy.campaign.storage_format import (
     operation_row,
     result_row,
     span_row,
+    statements,
     update,
 )
 from cosmic.autonomy.campaign.store_read import CampaignReader
@@ -221,9 +224,8 @@ def _lay_out(file: Path, info: CampaignInfo) -> None:
     connection = sqlite3.connect(part, isolation_level=None)
     try:
         connection.execute("BEGIN")
-        for statement in TABLES.split(";"):
-            if statement.strip():
-                connection.execute(statement)
+        for statement in statements(TABLES + LATER_TABLES):
+            connection.execute(statement)
         insert(connection, "campaign", row)
         connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         connection.execute("COMMIT")
@@ -380,6 +382,7 @@ class CampaignStore:
         time_s: float,
         length_um: float = math.nan,
         role: str = FIBRE,
+        plate: int = 1,
     ) -> int:
         """Note that a fibre's treatment begins, and return its number.
 
@@ -391,6 +394,7 @@ class CampaignStore:
             "began_s": time_s,
             "length_um": cell(length_um),
             "role": role,
+            "plate": plate,
         }
         if found is not None:
             row["found_x_plate_um"] = found.x_plate_um
@@ -423,6 +427,35 @@ class CampaignStore:
         }
         with self._connection.transaction(durable=False) as connection:
             insert(connection, "journal", row)
+
+    def keep_sightings(self, plate: int, sightings: Sequence[Sighting]) -> None:
+        """Keep what the first survey of a plate saw; without effect where one is kept already."""
+        with self._connection.transaction() as connection:
+            kept = connection.execute("SELECT 1 FROM sighting WHERE plate = ?", (plate,)).fetchone()
+            for order, each in enumerate(() if kept else sightings):
+                row: Row = {
+                    "plate": plate,
+                    "number": order,
+                    "x_plate_um": each.x_plate_um,
+                    "y_plate_um": each.y_plate_um,
+                    "length_um": cell(each.length_um),
+                    "width_um": cell(each.width_um),
+                    "curl": cell(each.curl),
+                    "problem": each.problem,
+                }
+                insert(connection, "sighting", row)
+
+    def begin_plate(self, plate: int, *, time_s: float, by: str) -> None:
+        """Note that another plate is asked for; from now on it is not known which one is there."""
+        row: Row = {"number": plate, "run": self._run, "asked_s": time_s, "put_by": by}
+        with self._connection.transaction() as connection:
+            connection.execute("DELETE FROM plate WHERE number = ? AND put_s IS NULL", (plate,))
+            insert(connection, "plate", row)
+
+    def finish_plate(self, plate: int, *, time_s: float) -> None:
+        """Note that it is there."""
+        with self._connection.transaction() as connection:
+            update(connection, "plate", {"put_s": time_s}, key=plate)
 
     def finish_fibre(self, record: FibreRecord) -> None:
         """Write all of a fibre, once.

@@ -1,6 +1,7 @@
 """Reading a campaign, also while it is written, and by another process."""
 
 import json
+import math
 import os
 import sqlite3
 from collections.abc import Generator
@@ -22,6 +23,8 @@ from cosmic.autonomy.campaign.records import (
     FibreRecord,
     Image,
     JournalEntry,
+    PlateChange,
+    Sighting,
 )
 from cosmic.autonomy.campaign.storage_format import (
     DATABASE,
@@ -146,6 +149,60 @@ class CampaignReader:
             == role
         )
 
+    def sightings(self) -> tuple[Sighting, ...]:
+        """Return what the first survey of each plate saw; empty where it was not kept."""
+        if not self._has("sighting"):
+            return ()
+        return tuple(
+            Sighting(
+                plate=int(number(row["plate"])),
+                x_plate_um=number(row["x_plate_um"]),
+                y_plate_um=number(row["y_plate_um"]),
+                length_um=number(row["length_um"]),
+                width_um=number(row["width_um"]),
+                curl=number(row["curl"]),
+                problem=str(row["problem"]),
+            )
+            for row in self._rows("SELECT * FROM sighting ORDER BY plate, number")
+        )
+
+    def plate_changes(self) -> tuple[PlateChange, ...]:
+        """Return the changes of the plate, oldest first; the last may not be over."""
+        if not self._has("plate"):
+            return ()
+        return tuple(
+            PlateChange(
+                plate=int(number(row["number"])),
+                run=int(number(row["run"])),
+                asked_s=number(row["asked_s"]),
+                put_s=number(row["put_s"]),
+                by=str(row["put_by"]),
+            )
+            for row in self._rows("SELECT * FROM plate ORDER BY number")
+        )
+
+    def handling_s(self, role: str = FIBRE) -> float:
+        """Return how long fibres of a role were in work, on the platform's clock.
+
+        What two arms do at the same time counts once.
+        """
+        rows = self._rows("SELECT * FROM fibre WHERE ended_s IS NOT NULL ORDER BY run, began_s")
+        whole_s, until_s = 0.0, -math.inf
+        run: Cell = None
+        for row in rows:
+            if row.get("role", FIBRE) != role:
+                continue
+            if row["run"] != run:
+                run, until_s = row["run"], -math.inf
+            begin_s, end_s = max(number(row["began_s"]), until_s), number(row["ended_s"])
+            whole_s += max(end_s - begin_s, 0.0)
+            until_s = max(until_s, end_s)
+        return whole_s
+
+    def _has(self, table: str) -> bool:
+        found = self._rows("SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?", table)
+        return bool(found)
+
     def raw_files(self) -> dict[int, tuple[Path, str]]:
         """Return where the raw curves of finished fibres and standards are, with their SHA-256.
 
@@ -160,6 +217,19 @@ class CampaignReader:
             for row in self._rows("SELECT * FROM fibre ORDER BY number")
             if row["file"] and row["outcome"] in finished
         }
+
+    def unfinished_files(self) -> tuple[str, ...]:
+        """Return raw files of fibres whose treatment was cut off: they have no value."""
+        finished = {each.value for each in FINISHED}
+        rows = self._rows("SELECT * FROM fibre")
+        return tuple(
+            str(row["file"]) for row in rows if row["file"] and row["outcome"] not in finished
+        )
+
+    def image_files(self) -> dict[str, str]:
+        """Return the files of all images with their SHA-256."""
+        rows = self._rows("SELECT file, sha256 FROM picture ORDER BY fibre, number")
+        return {str(row["file"]): str(row["sha256"]) for row in rows}
 
     def analysis(self) -> dict[str, Any]:
         """Return what the final analysis was done with, and what it says; empty: there is none."""

@@ -57,6 +57,10 @@ class SharedWorkspace:
         Why fibres of the last survey are not taken, and how many.
     finished : list of HeldFibre
         Those that were put away.
+    plate_from : int
+        How many were put away before the plate that is there now.
+    surveys : int
+        How often the plate was looked at.
     zoom_runs : int
         How often the zoom has run: each time the image comes to rest a little elsewhere.
     needs_initialisation : bool
@@ -89,6 +93,8 @@ class SharedWorkspace:
     since_survey: int = 0
     survey_deg: float = 0.0
     finished: list[HeldFibre] = field(default_factory=list)
+    plate_from: int = 0
+    surveys: int = 0
     numbers: int = 0
     needs_initialisation: bool = False
     seen: LastSeen = field(default_factory=LastSeen)
@@ -103,6 +109,14 @@ class SharedWorkspace:
         """Note that a fibre is done with, and its arm free for another."""
         self.finished.append(fibre)
         self.seeking.discard(fibre.arm)
+
+    def new_plate(self) -> None:
+        """Note that another plate is there: nothing that was known of the one before holds."""
+        for known in (self.candidates, self.lines_um, self.skipped, self.dropped, self.unsuitable):
+            known.clear()
+        self.skip_reasons = Counter()
+        self.standard, self.surveyed, self.since_survey = None, False, 0
+        self.plate_from = len(self.finished)
 
 
 @dataclass(frozen=True, slots=True)

@@ -241,7 +241,7 @@ class StandardSettings(StrictModel):
     x_um, y_um, within_um : float
         Where its middle lies on a plate that is put on, and how far from there it is looked for.
     at : tuple of str
-        When it is measured.
+        When it is measured; "plate" is on each further plate, before its fibres.
     """
 
     ei_n_m2: float = Field(0.0, ge=0.0)
@@ -252,7 +252,7 @@ class StandardSettings(StrictModel):
     x_um: float = 0.0
     y_um: float = -3900.0
     within_um: float = Field(800.0, gt=0.0)
-    at: tuple[Literal["begin", "middle", "end"], ...] = Field(
+    at: tuple[Literal["begin", "middle", "end", "plate"], ...] = Field(
         ("begin", "middle", "end"), strict=False
     )
 

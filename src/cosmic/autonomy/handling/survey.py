@@ -99,6 +99,7 @@ def look(work: HandlingContext, seen: list[SeenFibre]) -> None:
     work.shared.unsuitable = [each for each in checked if each.problem]
     work.shared.skip_reasons = Counter(each.problem for each in work.shared.unsuitable)
     work.shared.surveyed, work.shared.since_survey, work.shared.survey_deg = True, 0, angle
+    work.shared.surveys += 1
 
 
 def _leave_fallen(
@@ -108,7 +109,8 @@ def _leave_fallen(
 
     It clung to the jaws, was seen nowhere, and fell when nobody looked.
     """
-    measured = [each for each in work.shared.finished if each.bending is not None]
+    here = work.shared.finished[work.shared.plate_from :]
+    measured = [each for each in here if each.bending is not None]
     left = []
     for each in candidates:
         new = all(distance_um(each.line_um, line) > SAME_UM for line in before)
@@ -254,6 +256,21 @@ def approaches_of(work: HandlingContext, candidate: Candidate, angle_deg: float)
         Neighbours(others),
         angle_deg,
     )
+
+
+def sighted(work: HandlingContext) -> list[Candidate]:
+    """Return all that the last survey saw, each with the problem for which it is not taken."""
+    return [
+        *(
+            each if _reached(work, each) else replace(each, problem=OUT_OF_REACH)
+            for each in work.shared.candidates
+        ),
+        *work.shared.unsuitable,
+    ]
+
+
+def _reached(work: HandlingContext, candidate: Candidate) -> bool:
+    return any(approaches_of(arm, candidate, arm.table_deg) for arm in work.arms)
 
 
 def take(work: HandlingContext, approach: Reach, *, standard: bool = False) -> None:

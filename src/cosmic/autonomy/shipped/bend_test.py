@@ -5,6 +5,7 @@ The transport goes the same way and measures nothing.
 
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.grasp import MISSED, Carry, TestGrasp
+from cosmic.autonomy.handling.plate_change import ChangePlate, PlateHandler
 from cosmic.autonomy.handling.prepare import InitialiseAgain, MakeReady, make_safe
 from cosmic.autonomy.handling.push import (
     NO_CONTACT,
@@ -167,6 +168,25 @@ def one_standard(
         ),
         back,
         LeaveStandard(),
+    )
+
+
+def build_plate_change(
+    settings: HandlingSettings | None,  # noqa: ARG001 - as the others are built
+    handler: PlateHandler,
+    plate: int,
+) -> Procedure[HandlingContext]:
+    """Return the procedure by which a handler puts another plate there, with one gripper."""
+    return Procedure(
+        "another plate",
+        Sequence(
+            "another plate",
+            InitialiseAgain(),
+            ClearUp(),
+            MakeReady(),
+            ChangePlate(handler, plate),
+        ),
+        make_safe=make_safe,
     )
 
 

@@ -17,6 +17,7 @@ from cosmic.autonomy.handling.dual_gripper import (
     hidden,
     over,
 )
+from cosmic.autonomy.handling.plate_change import ChangePlate, PlateHandler
 from cosmic.autonomy.handling.prepare import (
     InitialiseAgain,
     MakeReady,
@@ -86,6 +87,26 @@ def build_standard_in_turn(settings: HandlingSettings | None = None) -> Procedur
             prepare(settings, LookForStandard()),
             *_each(ClearAway()),
             _as(ARMS[0], one_standard(settings, CarryInTurn(), Withdraw())),
+        ),
+        make_safe=make_safe,
+    )
+
+
+def build_plate_change_in_turn(
+    settings: HandlingSettings | None,  # noqa: ARG001 - as the others are built
+    handler: PlateHandler,
+    plate: int,
+) -> Procedure[HandlingContext]:
+    """Return the procedure by which a handler puts another plate there, beside both arms."""
+    return Procedure(
+        "another plate",
+        Sequence(
+            "another plate",
+            InitialiseAgain(),
+            _as(ARMS[0], Retract()),
+            *_each(ClearUp()),
+            *_each(MakeReady()),
+            ChangePlate(handler, plate),
         ),
         make_safe=make_safe,
     )

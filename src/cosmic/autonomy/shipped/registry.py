@@ -11,10 +11,20 @@ from typing import Any, Final
 from typing_extensions import override
 
 from cosmic.autonomy.handling.context import HandlingContext
+from cosmic.autonomy.handling.plate_change import PlateHandler
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.procedure import Procedure
-from cosmic.autonomy.shipped.bend_test import build_bend_test, build_standard, build_transport
-from cosmic.autonomy.shipped.ping_pong import build_ping_pong, build_standard_in_turn
+from cosmic.autonomy.shipped.bend_test import (
+    build_bend_test,
+    build_plate_change,
+    build_standard,
+    build_transport,
+)
+from cosmic.autonomy.shipped.ping_pong import (
+    build_ping_pong,
+    build_plate_change_in_turn,
+    build_standard_in_turn,
+)
 from cosmic.frame.config import StrictModel
 from cosmic.frame.plugins import Backend, Kind, find_backend, names
 
@@ -35,12 +45,17 @@ class ShippedProcedure:
     standard : callable or None
         Makes from the same parameters the procedure that bends the standard and puts it back;
         None: a standard is not measured.
+    change_plate : callable
+        Makes from the same parameters the procedure by which a handler puts a plate there.
     """
 
     build: Callable[[Any], Procedure[HandlingContext]]
     measures: bool = True
     arms: int = 1
     standard: Callable[[Any], Procedure[HandlingContext]] | None = None
+    change_plate: Callable[[Any, PlateHandler, int], Procedure[HandlingContext]] = (
+        build_plate_change
+    )
 
 
 ProcedureBackend = Backend[None, ShippedProcedure]
@@ -104,6 +119,11 @@ def procedure_backend(
 
 BEND_TEST: Final = procedure_backend(ShippedProcedure(build_bend_test, standard=build_standard))
 PING_PONG: Final = procedure_backend(
-    ShippedProcedure(build_ping_pong, arms=2, standard=build_standard_in_turn)
+    ShippedProcedure(
+        build_ping_pong,
+        arms=2,
+        standard=build_standard_in_turn,
+        change_plate=build_plate_change_in_turn,
+    )
 )
 TRANSPORT: Final = procedure_backend(ShippedProcedure(build_transport, measures=False))

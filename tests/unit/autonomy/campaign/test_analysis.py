@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import shutil
 import sqlite3
 from pathlib import Path
 
@@ -45,7 +46,9 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
             number = store.begin_fibre(time_s=100.0 * n, role=role)
             record = good(number, ei_n_m2=ei, seed=n)
             store.finish_fibre(
-                dataclasses.replace(record, role=role, elapsed_s=100.0 * n, images=())
+                dataclasses.replace(
+                    record, role=role, elapsed_s=100.0 * n, images=record.images if n == 1 else ()
+                )
             )
         finish(store)
     return folder
@@ -126,6 +129,32 @@ def test_a_raw_file_that_was_changed_is_refused(campaign: Path, tmp_path: Path) 
     file.unlink()
     with pytest.raises(CampaignError, match=r"00002\.h5 cannot be read"):
         analyse(CampaignReader(folder))
+
+
+def test_what_beside_the_raw_files_is_not_as_it_was_written_is_named(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    image = next((folder / "fibres").glob("*.png"))
+    image.write_bytes(image.read_bytes() + b"x")
+    shutil.copy(folder / "fibres" / "00002.h5", folder / "fibres" / "00077.h5")
+    assert main(["recompute", str(folder)]) == 4
+    said = capsys.readouterr().out
+    assert "0 changed" in said
+    assert f"{image.name}: its SHA-256 differs" in said
+    assert "fibres/00077.h5 belongs to no fibre of the record" in said
+    assert main(["recompute", str(campaign)]) == 0
+
+
+def test_a_value_that_no_raw_file_stands_for_is_named(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute("UPDATE fibre SET file = '' WHERE number = 2")
+    base.close()
+    assert main(["recompute", str(folder)]) == 3
+    assert "not in the raw files: fibre 2" in capsys.readouterr().out
 
 
 def test_another_version_of_the_analysis_is_named(campaign: Path, tmp_path: Path) -> None:

@@ -1,13 +1,20 @@
 """How a campaign stands, and when it ends."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from cosmic.autonomy.campaign.records import FibreRecord, Outcome
-from cosmic.autonomy.campaign.statistics import CampaignProgress, mean_ei, progress
+from cosmic.autonomy.campaign.statistics import (
+    CampaignProgress,
+    fibres_needed,
+    mean_ei,
+    progress,
+    share_interval,
+)
 from cosmic.autonomy.campaign.stop_rule import StopRule, StopSettings
 from unit.autonomy.campaign.sample_records import failed, good
 
@@ -66,12 +73,14 @@ def test_one_fibre_says_nothing_about_the_pulp() -> None:
         (StopSettings(precision_percent=50.0, least=6), 100.0, "mean stiffness known to"),
         (StopSettings(precision_percent=50.0, least=7), 100.0, ""),
         (StopSettings(precision_percent=0.1, least=2), 100.0, ""),
+        (StopSettings(plates=2), 100.0, "2 plates worked off"),
+        (StopSettings(plates=3), 100.0, ""),
     ],
 )
 def test_the_first_rule_that_is_met_ends_the_campaign(
     settings: StopSettings, elapsed_s: float, words: str
 ) -> None:
-    reason = StopRule(settings).reason(progress(some(6, 2), elapsed_s))
+    reason = StopRule(settings).reason(progress(some(6, 2), elapsed_s, plates=2))
     assert reason.startswith(words)
     assert bool(reason) == bool(words)
 
@@ -90,8 +99,37 @@ def test_the_time_to_a_precision_grows_with_the_spread() -> None:
         fibres = [good(n, ei_n_m2=float(5e-11 * np.exp(each))) for n, each in enumerate(logs)]
         return progress(fibres, 100.0)
 
-    rule = StopRule(StopSettings(precision_percent=5.0, least=2))
+    rule = StopRule(StopSettings(precision_percent=10.0, least=2))
     assert 0.0 < rule.left_s(spread(0.2)) < rule.left_s(spread(0.6))
+
+
+def test_what_all_fibres_share_is_in_the_interval_of_their_mean_and_does_not_average_out() -> None:
+    rng, covered = np.random.default_rng(3), 0
+    for _ in range(400):
+        shared = 0.05 * rng.standard_normal()
+        values = 5e-11 * np.exp(shared + 0.2 * rng.standard_normal(60))
+        found = mean_ei(values, common_std_ln=0.05)
+        covered += found.ei_low_n_m2 <= 5e-11 <= found.ei_high_n_m2
+    assert 0.92 <= covered / 400 <= 0.98
+    assert mean_ei(values).precision_percent < 0.6 * found.precision_percent
+    more = [fibres_needed(replace(found, common_std_ln=each), 10.0) for each in (0.0, 0.02, 0.06)]
+    assert more[0] < more[1] < more[2] == math.inf
+
+
+def test_a_precision_that_no_number_of_fibres_reaches_is_named_and_foretold_by_no_time() -> None:
+    now = progress(some(6, 2), 160.0)
+    rule = StopRule(StopSettings(precision_percent=0.1, least=2))
+    assert "no number of fibres" in rule.plan(now)
+    assert math.isnan(rule.left_s(now))
+    assert "good fibres for ±30 %" in StopRule(StopSettings(precision_percent=30.0)).plan(now)
+
+
+def test_the_interval_of_a_share_stays_inside_and_covers_it() -> None:
+    assert share_interval(10, 10)[1] == 100.0
+    assert share_interval(0, 10)[0] == 0.0
+    rng = np.random.default_rng(4)
+    hits = [share_interval(int(n), 20) for n in rng.binomial(20, 0.8, 500)]
+    assert 0.92 <= np.mean([low <= 80.0 <= high for low, high in hits]) <= 0.99
 
 
 def test_nothing_is_reported_before_the_first_fibre() -> None:

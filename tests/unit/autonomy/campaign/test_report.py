@@ -54,7 +54,9 @@ def page(folder: Path) -> str:
 def test_the_page_needs_no_other_file(page: str) -> None:
     assert page.startswith("<!doctype html>")
     for address in re.findall(r'(?:src|href)="([^"]*)"', page):
-        raw = re.fullmatch(r"record|fibres/\d{5}\.h5", address)  # beside it, for who wants more
+        raw = re.fullmatch(
+            r"#selection|record|fibres/\d{5}\.h5", address
+        )  # beside it, for who wants more
         assert raw or address.startswith("data:image/png;base64,")
     assert "<script" not in page
     assert "@import" not in page
@@ -71,7 +73,8 @@ def test_the_page_needs_no_other_file(page: str) -> None:
         "2026-03-02 09:30:00+01:00",
         "5 fibres done",
         "5: 3 good, 1 measured but not trusted, 1 failed",
-        "<td>60 %</td>",
+        "3 of 5: 60 % (23 to 88 %)",
+        "is shared by all and does not average out",
         "These fibres were simulated.",
         "It does not show how often real jaws miss",
         "failed: jaw adhesion",
@@ -105,6 +108,13 @@ def test_every_figure_is_a_drawing_with_units_on_its_axes(page: str) -> None:
     assert labels.count("bending stiffness, 10⁻¹² N m²") == 1
     assert "jaw adhesion" in labels
     assert "push" in labels, "time of the operations"
+
+
+def test_no_more_than_two_figures_stand_beside_each_other(page: str) -> None:
+    rows = re.findall(r"<tr>(<td valign=\"top\">.*?)</tr>", page)
+    assert rows
+    assert max(row.count('<td valign="top">') for row in rows) == 2
+    assert page.count("Residuals of fibre") == 4
 
 
 def test_a_report_can_be_written_while_the_campaign_runs(tmp_path: Path) -> None:

@@ -147,6 +147,21 @@ def test_what_a_stop_left_without_a_position_is_initialised_first(
     assert work.shared.needs_initialisation is (confidence is Confidence.UNKNOWN)
 
 
+def test_only_fibres_of_the_plate_that_is_there_are_known_again(store: CampaignStore) -> None:
+    left_behind(store)
+    store.begin_plate(2, time_s=100.0, by="person")
+    plan = resume(store)
+    assert (plan.plate, plan.plate_pending) == (2, True)
+    store.finish_plate(2, time_s=160.0)
+    here = store.begin_fibre(time_s=170.0, plate=2)
+    store.finish_fibre(replace(failed(here), found=Pose(0.0, 0.0, 0.0)))
+    plan = resume(store)
+    assert (plan.plate, plan.plate_pending) == (2, False)
+    assert [each.number for each in plan.known] == [here]
+    (change,) = store.reader.plate_changes()
+    assert (change.by, change.put_s - change.asked_s) == ("person", 60.0)
+
+
 def test_what_looks_like_one_that_fell_is_not_taken_after_the_restart(
     store: CampaignStore,
 ) -> None:

@@ -32,7 +32,7 @@ from cosmic.autonomy.campaign.formatting import (
     width_words,
     with_interval,
 )
-from cosmic.autonomy.campaign.records import FibreImage
+from cosmic.autonomy.campaign.records import FibreImage, Floats
 from cosmic.autonomy.campaign.snapshot import FibreCardData, Mask, SpanCurve
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button, tipped
@@ -138,12 +138,15 @@ class FibreCurves(CurveFrame):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(_AXIS_PX, parent)
-        self.box, _ = self._add_field("force, µN")
+        self.box, _ = self._add_field("force, µN", 3)
+        self.left, _ = self._add_field("less model, µN")
+        self.left.setXLink(self.box)
         self._add_axis_below("push beyond the first contact, µm")
         self.setMinimumSize(36 * STEP_PX, 28 * STEP_PX)
         self.setToolTip(
             "Force over push beyond the first contact: full points loading, hollow ones "
-            "unloading, lines of the model; one set per position along the fibre"
+            "unloading, lines of the model; one set per position along the fibre. Below: what "
+            "the model leaves of the force"
         )
         self._curves: tuple[SpanCurve, ...] = ()
         self.labels: list[pg.TextItem] = []
@@ -155,8 +158,9 @@ class FibreCurves(CurveFrame):
         self._draw()
 
     def _draw(self) -> None:
-        for item in list(self.box.addedItems):
-            self.box.removeItem(item)
+        for box in (self.box, self.left):
+            for item in list(box.addedItems):
+                box.removeItem(item)
         self.labels = []
         palette = current_palette()
         for curve in self._curves:
@@ -171,9 +175,13 @@ class FibreCurves(CurveFrame):
                 self.box.addItem(line)
             self.box.addItem(_points(curve, back, _BACK, hollow=True))
             self.box.addItem(_points(curve, curve.loading, _OUT, hollow=False))
+            self.left.addItem(_residuals(curve, back, _BACK, hollow=True))
+            self.left.addItem(_residuals(curve, curve.loading, _OUT, hollow=False))
             self._label(curve, palette.text)
         if self._curves:
+            self.left.addItem(pg.InfiniteLine(0.0, 0, pen=pg.mkPen(palette.dim, width=1)))
             self.box.autoRange(padding=0.12)
+            self.left.autoRange(padding=0.12)
 
     def _label(self, curve: SpanCurve, colour: str) -> None:
         last = int(np.argmax(curve.probe_um))
@@ -190,15 +198,26 @@ class FibreCurves(CurveFrame):
 
 
 def _points(curve: SpanCurve, which: Mask, colour: str, *, hollow: bool) -> pg.ScatterPlotItem:
+    return _dots(curve.probe_um[which], curve.force_un[which], colour, hollow=hollow)
+
+
+def _residuals(curve: SpanCurve, which: Mask, colour: str, *, hollow: bool) -> pg.ScatterPlotItem:
+    shown = which & np.isfinite(curve.fitted_un)
+    away_un = curve.force_un[shown] - curve.fitted_un[shown]
+    return _dots(curve.probe_um[shown], away_un, colour, hollow=hollow)
+
+
+def _dots(x: Floats, y: Floats, colour: str, *, hollow: bool) -> pg.ScatterPlotItem:
     return pg.ScatterPlotItem(
-        curve.probe_um[which],
-        curve.force_un[which],
+        x,
+        y,
         size=_POINT_PX,
         pen=pg.mkPen(colour, width=1.2) if hollow else pg.mkPen(None),
         brush=None if hollow else QColor(colour),
     )
 
 
+_BUDGET_HEAD: Final = ["contribution", "kind", "uncertainty", "d ln(EI)", "share, %"]
 _WIDE_PX: Final = 90 * STEP_PX
 """From this width on image and curves stand side by side."""
 
@@ -235,6 +254,7 @@ class FibreCard(QWidget):
         self.curves = FibreCurves()
         self.numbers = QGridLayout()
         self.spans = QGridLayout()
+        self.budget = QGridLayout()
         self.doubts = _words("cardDoubts")
         self.failures = _words("cardFailures")
         self._build()
@@ -256,7 +276,7 @@ class FibreCard(QWidget):
         self._seen = QWidget()
         self._seen.setLayout(seen)
         seen.setContentsMargins(0, 0, 0, 0)
-        for grid in (self.numbers, self.spans):
+        for grid in (self.numbers, self.spans, self.budget):
             grid.setHorizontalSpacing(2 * STEP_PX)
             grid.setVerticalSpacing(STEP_PX // 2)
         inside = named(QWidget(), "dockBody")
@@ -266,7 +286,7 @@ class FibreCard(QWidget):
         column.addLayout(head)
         column.addWidget(self.text)
         column.addLayout(self._figures, 1)
-        for layout in (self.numbers, self.spans):
+        for layout in (self.numbers, self.spans, self.budget):
             row = QHBoxLayout()
             row.addLayout(layout)
             row.addStretch(1)
@@ -312,6 +332,7 @@ class FibreCard(QWidget):
         self.curves.setVisible(bool(card.curves))
         _fill(self.numbers, [[name, text] for name, text in _numbers(card)])
         _fill(self.spans, _span_rows(card.curves))
+        _fill(self.budget, [_BUDGET_HEAD, *map(list, card.budget)] if card.budget else [])
         flags = f"Doubtful: {', '.join(card.flags)}." if card.flags else ""
         parts = (flags, *card.doubts, card.uncertainty)
         _say(self.doubts, "\n".join(part for part in parts if part))
@@ -332,7 +353,7 @@ class FibreCard(QWidget):
         self.curves.hide()
         for label in (self.text, self.doubts, self.failures):
             _say(label, "")
-        for grid in (self.numbers, self.spans):
+        for grid in (self.numbers, self.spans, self.budget):
             _fill(grid, [])
 
     def _on_image_chosen(self, place: int) -> None:

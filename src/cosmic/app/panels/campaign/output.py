@@ -24,7 +24,11 @@ from PySide6.QtGui import (
     QPageLayout,
     QPageSize,
     QPdfWriter,
+    QTextBlock,
+    QTextBlockFormat,
+    QTextCursor,
     QTextDocument,
+    QTextFormat,
 )
 from PySide6.QtSvg import QSvgRenderer
 
@@ -43,6 +47,12 @@ FINE: Final = 3
 FIGURE_PX: Final = 330
 """Widest of two beside each other."""
 
+MOST_BREAKS: Final = 20
+"""Headings that are put on the next page; more would take long to lay out."""
+
+IMAGE_PX: Final = 216
+"""Widest image of a fibre: three figures stand beside each other."""
+
 NUMBER_PX: Final = 10
 MARGINS_MM: Final = (15.0, 15.0, 15.0, 15.0)
 WIDTH_PX: Final = 680.0
@@ -60,7 +70,7 @@ class _Figures:
     def svg(self, svg: str, width_px: int) -> str:
         drawing = QSvgRenderer(QByteArray(svg.encode()))
         size = drawing.defaultSize()
-        width_px = width_px if width_px > FIGURE_PX + 100 else FIGURE_PX
+        width_px = width_px if width_px > FIGURE_PX + 100 else min(width_px, FIGURE_PX)
         height_px = round(width_px * size.height() / size.width())
         image = QImage(FINE * width_px, FINE * height_px, QImage.Format.Format_RGB32)
         image.fill(0xFFFFFFFF)
@@ -70,7 +80,7 @@ class _Figures:
 
     def png(self, data: bytes, width_px: int, words: str) -> str:
         image = QImage.fromData(data)
-        width_px = min(width_px, FIGURE_PX)
+        width_px = min(width_px, IMAGE_PX)
         height_px = round(width_px * image.height() / max(image.width(), 1))
         return self._keep(image, width_px, height_px, words)
 
@@ -118,6 +128,7 @@ def _print(document: QTextDocument, writer: QPdfWriter) -> None:
     """Print page by page, with their numbers."""
     document.setDocumentMargin(0.0)
     document.setPageSize(QSizeF(WIDTH_PX, HEIGHT_PX))
+    _keep_headings(document)
     with painting(writer) as painter:
         scale = writer.width() / WIDTH_PX
         font = QFont(document.defaultFont())
@@ -137,6 +148,44 @@ def _print(document: QTextDocument, writer: QPdfWriter) -> None:
             painter.translate(0.0, -page * HEIGHT_PX)
             document.drawContents(painter, QRectF(0.0, page * HEIGHT_PX, WIDTH_PX, HEIGHT_PX))
             painter.restore()
+
+
+def _keep_headings(document: QTextDocument) -> None:
+    """Begin a page with each heading that would stand at the end of one without its text."""
+    for _ in range(MOST_BREAKS):
+        alone = _alone(document)
+        if alone is None:
+            return
+        broken = QTextBlockFormat()
+        broken.setPageBreakPolicy(QTextFormat.PageBreakFlag.PageBreak_AlwaysBefore)
+        QTextCursor(alone).mergeBlockFormat(broken)
+        # What stands behind it is laid out anew only with another size of the page.
+        document.setPageSize(QSizeF(WIDTH_PX, 2.0 * HEIGHT_PX))
+        document.setPageSize(QSizeF(WIDTH_PX, HEIGHT_PX))
+
+
+def _alone(document: QTextDocument) -> QTextBlock | None:
+    """Return the first heading whose text begins on the next page."""
+    block = document.begin()
+    while block.isValid():
+        text = block.next()
+        if block.blockFormat().headingLevel():
+            while text.isValid() and not text.text().strip():
+                text = text.next()
+            if text.isValid() and _page(document, block) < _page(document, text):
+                return block
+        block = block.next()
+    return None
+
+
+def _page(document: QTextDocument, block: QTextBlock) -> int:
+    """Return the page on which the first line of a block ends."""
+    top = document.documentLayout().blockBoundingRect(block).top()
+    layout = block.layout()
+    if layout is not None and layout.lineCount():
+        line = layout.lineAt(0)
+        top += line.y() + line.height()
+    return int(top // HEIGHT_PX)
 
 
 HTML: Final = "report.html"

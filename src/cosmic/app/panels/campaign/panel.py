@@ -179,16 +179,20 @@ class CampaignPanel(QWidget):
         self.report = named(
             push_button("Report", "Write the report and the table of the fibres so far"), "report"
         )
+        self.plate = named(
+            push_button("Plate is there", "Confirm the plate that is asked for"), "plateIsThere"
+        )
         self.message = named(ElidedLabel(), "campaignMessage")
         self.procedure = ProcedureTreePanel(self._make_run, self._go_on)
         self.board = CampaignBoard()
         self.card = FibreCard()
         self.report.setEnabled(False)
+        self.plate.hide()
 
     def _arrange(self) -> None:
         head, flow = QWidget(), FlowLayout(STEP_PX)
         head.setLayout(flow)
-        for widget in (self.recipe, self.choose, self.report):
+        for widget in (self.recipe, self.choose, self.report, self.plate):
             flow.addWidget(widget)
         self.tabs = QTabWidget()
         self.tabs.addTab(self.procedure, "Procedure")
@@ -207,6 +211,7 @@ class CampaignPanel(QWidget):
         self.recipe.activated.connect(self._on_recipe)
         self.choose.clicked.connect(self._on_choose)
         self.report.clicked.connect(self.write_report)
+        self.plate.clicked.connect(self.confirm_plate)
         self.card.replay_requested.connect(self._on_replay)
         self.board.fibre_chosen.connect(self.show_fibre)
 
@@ -279,6 +284,7 @@ class CampaignPanel(QWidget):
         self.report.setEnabled(campaign is not None and self._writing is None)
         if campaign is None:
             return
+        self._show_request(campaign.request)
         self.board.set_state(
             snapshot_of(
                 campaign.recipe.name,
@@ -297,6 +303,22 @@ class CampaignPanel(QWidget):
                 f"Resume goes on in {campaign.store.folder.name}; Start begins a new one"
             )
             self.message.show()
+
+    def _show_request(self, request: str) -> None:
+        if request and not self.plate.isVisibleTo(self):
+            self._say(request, State.BUSY)
+        elif not request and self.plate.isVisibleTo(self):
+            self._say("")
+        self.plate.setVisible(bool(request))
+
+    def confirm_plate(self) -> None:
+        """Say that the plate is on the table which the campaign asks for."""
+        if self._campaign is None:
+            return
+        try:
+            self._campaign.confirm_plate()
+        except CosmicError as exc:
+            self._say(str(exc))
 
     # Looking at what there is
 
