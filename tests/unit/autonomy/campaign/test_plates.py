@@ -22,9 +22,9 @@ def store(tmp_path: Path) -> Iterator[CampaignStore]:
         yield opened
 
 
-def plates(most: int = 3, **told: Any) -> CampaignPlates:
+def plates(most: int = 3, **more: Any) -> CampaignPlates:
     nothing: Any = cast("Any", None)
-    return CampaignPlates(most, PlateByPerson(), lambda handler, plate: nothing, **told)
+    return CampaignPlates(most, PlateByPerson(), lambda handler, plate: nothing, **more)
 
 
 def test_a_plate_is_there_once_somebody_says_so() -> None:

@@ -36,7 +36,7 @@ def put(
     store.finish_fibre(replace(record, number=number, found=found, ended_s=ended_s))
 
 
-def test_success_is_told_of_those_seen_of_those_that_could_be_grasped_and_of_those_tried(
+def test_success_is_counted_of_those_seen_of_those_that_could_be_grasped_and_of_those_tried(
     store: CampaignStore,
 ) -> None:
     plates = [sighting(0.0), sighting(500.0, "crossing"), sighting(1000.0, "too near to another")]
@@ -53,7 +53,7 @@ def test_success_is_told_of_those_seen_of_those_that_could_be_grasped_and_of_tho
     assert rates.part(rates.graspable) == 0.75
 
 
-def test_the_time_of_a_campaign_is_told_apart(store: CampaignStore) -> None:
+def test_the_time_of_a_campaign_is_divided_by_what_it_went_to(store: CampaignStore) -> None:
     put(store, replace(good(0), began_s=100.0), 0.0)
     put(store, replace(good(0), began_s=110.0), 500.0)  # the other arm's, meanwhile
     put(store, replace(good(0), role=STANDARD, began_s=200.0), 800.0, took_s=30.0)
