@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -175,19 +176,40 @@ def test_who_started_a_campaign_and_falls_silent_ends_it(tmp_path: Path) -> None
         assert wait_until(lambda: door.begun[0].phase == "stopped", 5.0)
 
 
-def test_an_assistant_keeps_the_right_to_move_while_it_thinks_and_not_when_it_is_gone(
-    tmp_path: Path,
+def test_an_assistant_that_thinks_keeps_the_right_to_move_and_what_moves_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("cosmic.app.gateways.http.MCP_WAIT_S", 0.1)
     with opened(tmp_path) as door:
-        taken = json.loads(door.tool("take_control", keep_s=2.5))
+        taken = json.loads(door.tool("take_control", keep_s=8.0))
         assert taken["in_control"]
-        assert "silent for 2.5 s" in taken["control"]["why"], "a window shows how long"
+        assert "silent for 8 s" in taken["control"]["why"], "a window shows how long"
         door.tool("campaigns_start", recipe="mine", folder="first")
-        assert not wait_until(lambda: door.begun[0].over, 1.8), "it thinks"
-        assert json.loads(door.tool("read_state", application="campaigns", path="done")) == 3
-        assert wait_until(lambda: door.begun[0].phase == "stopped", 6.0), "it is gone"
-        assert door.http.get("/api/station").json()["control"]["local"]
+        assert wait_until(lambda: door.begun[0].phase == "stopped", 4.0), "nobody is seen there"
+        assert door.http.get("/api/station").json()["in_control"]
+        door.tool("take_control", keep_s=1.0)
+        time.sleep(1.5)
         assert "NO_LEASE" in door.command("resume").text
+
+
+def test_an_assistant_that_holds_a_line_open_is_there_until_that_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosmic.app.gateways.http.MCP_WAIT_S", 0.1)
+    with opened(tmp_path) as door:
+        begin = {"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": {}}
+        session = door.http.post("/mcp", json=begin).headers["Mcp-Session-Id"]
+        headers = {"Accept": "text/event-stream", "Mcp-Session-Id": session}
+        with door.http.stream("GET", "/mcp", headers=headers) as line:
+            words = line.iter_raw()  # closed with its last reference, and the line with it
+            assert next(words) == b": alive\n\n"
+            door.tool("take_control", keep_s=8.0)
+            door.tool("campaigns_start", recipe="mine", folder="first")
+            assert not wait_until(lambda: door.begun[0].over, 2.5), "its line is open"
+        assert wait_until(lambda: door.begun[0].phase == "stopped", 1.0), "it is gone"
+        assert door.http.get("/api/station").json()["in_control"]
+        assert door.http.delete("/mcp", headers=headers).is_success
+        assert door.http.get("/api/station").json()["control"]["local"]
 
 
 def test_an_assistant_follows_and_ends_what_goes_on(
@@ -262,9 +284,10 @@ def test_the_page_shows_a_campaign_in_a_browser(tmp_path: Path) -> None:
 
         assert "Campaign none was started here" in shown("none was started")
         door.http.post("/api/control?keep=60")
-        door.command("start", recipe="mine", folder="first")
-        text = shown("running")
-        assert "Recipe mine in first State running Operation take the fibre" in text
-        assert "Fibres 3 done, 1 failed Good 2 (67 %) Elapsed 20 s, left: 1 min 0 s" in text
-        door.command("abort", reason="enough")
+        with door.http.stream("GET", "/mcp"):  # nothing moves for whom nobody sees
+            door.command("start", recipe="mine", folder="first")
+            text = shown("running")
+            assert "Recipe mine in first State running Operation take the fibre" in text
+            assert "Fibres 3 done, 1 failed Good 2 (67 %) Elapsed 20 s, left: 1 min 0 s" in text
+            door.command("abort", reason="enough")
         assert "State stopped: enough" in shown("enough")

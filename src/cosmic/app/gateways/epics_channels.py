@@ -2,7 +2,6 @@
 
 import asyncio
 import logging
-import socket
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from caproto._utils import ConversionDirection
 from caproto.asyncio.server import Context
 from typing_extensions import override
 
+from cosmic.app.gateways.line_watch import keep_watch
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.errors import CallRefused
@@ -25,9 +25,6 @@ logger = logging.getLogger(__name__)
 MOST_CLIENTS: Final = 64
 JSON_LENGTH: Final = 16_000
 _START_S: Final = 10.0
-_ALIVE_S: Final = 1
-"""How long a line may be silent until the system looks whether its other end is there."""
-_MOST_MISSED: Final = 2
 
 _DONE: Final = int(CAStatus.ECA_NORMAL.value.code_with_severity)
 _REFUSED: Final = int(CAStatus.ECA_PUTFAIL.value.code_with_severity)
@@ -247,7 +244,7 @@ class ChannelServer(WorkerThread):
             if len(context.circuits) >= MOST_CLIENTS:
                 client.writer.close()
                 return
-            _keep_watch(client)
+            keep_watch(client.writer.get_extra_info("socket"))
             await accept(client, address)
 
         context.circuit_disconnected, context.tcp_handler = gone, come
@@ -302,20 +299,3 @@ class ChannelServer(WorkerThread):
 
 async def _nothing() -> None:
     await asyncio.Event().wait()
-
-
-def _keep_watch(client: Any) -> None:
-    """Have the system notice a line whose other end is gone, within 3 s."""
-    bound = client.writer.get_extra_info("socket")
-    options = (
-        ("SO_KEEPALIVE", socket.SOL_SOCKET, 1),
-        ("TCP_KEEPIDLE", socket.IPPROTO_TCP, _ALIVE_S),
-        ("TCP_KEEPINTVL", socket.IPPROTO_TCP, _ALIVE_S),
-        ("TCP_KEEPCNT", socket.IPPROTO_TCP, _MOST_MISSED),
-        ("TCP_USER_TIMEOUT", socket.IPPROTO_TCP, 1000 * _ALIVE_S * (_MOST_MISSED + 1)),
-    )
-    for name, level, value in options:
-        option = getattr(socket, name, None)  # not every system has all of them
-        if option is not None and bound is not None:
-            with suppress(OSError):
-                bound.setsockopt(level, option, value)

@@ -4,7 +4,7 @@ import asyncio
 import json
 import logging
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -15,7 +15,13 @@ from typing import Any, Final, TypeVar
 
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import FileResponse, HTMLResponse, JSONResponse, Response
+from starlette.responses import (
+    FileResponse,
+    HTMLResponse,
+    JSONResponse,
+    Response,
+    StreamingResponse,
+)
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -60,8 +66,8 @@ MOST_REQUESTS_S: Final = 200.0
 MOST_WAITING: Final = 32
 """So many commands wait for one application."""
 LONGEST_WAIT_S: Final = 60.0
-MCP_WAIT_S: Final = 20.0
-"""So long a tool of MCP waits for the end of what it began; that goes on."""
+MCP_WAIT_S: Final = 45.0
+"""So long a tool of MCP waits for the end of what it began; common clients wait for 60 s."""
 FIRST_WORD_S: Final = 3.0
 MOST_OPERATIONS: Final = 256
 SLOWED_AFTER: Final = 20
@@ -155,7 +161,9 @@ class HttpGateway:
         }
         application = self._application()
         self._socket = listening(settings)
-        self._server = HttpServer(application, self._socket, settings, station)
+        self._server = HttpServer(
+            application, self._socket, settings, station, self._end_silent_motion
+        )
         self._server.start()
 
     @property
@@ -175,6 +183,10 @@ class HttpGateway:
         for queue in self._queues.values():
             queue.request_end()
             queue.join()
+
+    def _end_silent_motion(self) -> None:
+        for user in self._users.values():
+            user.session.end_silent_motion()
 
     def _user(self, settings: HttpClient) -> _User:
         access = Access[settings.access.upper()]
@@ -197,6 +209,8 @@ class HttpGateway:
                 route("/api/files/{name}", self._file, "GET"),
                 WebSocketRoute("/api/events", self._events),
                 route("/mcp", self._mcp, "POST"),
+                route("/mcp", self._mcp_line, "GET"),
+                route("/mcp", self._mcp_end, "DELETE"),
                 route("/api/{application}/{path:path}", self._state, "GET"),
                 route("/api/{application}/{path:path}", self._command, "POST"),
             ]
@@ -368,8 +382,33 @@ class HttpGateway:
             return await self._controlled(user, keep_s and min(max(keep_s, 1.0), longest_s))
 
         uses = McpUses(call, look, control, follow)
-        answer = await self._tools.answer(await body_of(request), uses)
-        return Response(status_code=202) if answer is None else JSONResponse(answer)
+        message = await body_of(request)
+        answer = await self._tools.answer(message, uses)
+        if answer is None:
+            return Response(status_code=202)
+        begins = message.get("method") == "initialize"  # clients open a line only for a session
+        named = {"Mcp-Session-Id": secrets.token_hex(16)} if begins else {}
+        return JSONResponse(answer, headers=named)
+
+    async def _mcp_line(self, _request: Request, user: _User) -> Response:
+        """Hold a line open, by which the program is known to be there."""
+
+        async def alive() -> AsyncIterator[bytes]:
+            user.lines += 1
+            try:
+                while True:
+                    yield b": alive\n\n"
+                    user.session.beat()
+                    await asyncio.sleep(BEAT_S)
+            finally:
+                self._hung_up(user)
+
+        return StreamingResponse(alive(), media_type="text/event-stream")
+
+    async def _mcp_end(self, _request: Request, user: _User) -> Response:
+        why = f"{user.settings.name} ended its session"
+        await self._job("stops", lambda: user.session.lose_motion(why), "the end of a session")
+        return Response(status_code=200)
 
     async def _carried_out(self, request: Request, user: _User, order: Order, queue: str) -> object:
         if queue != "stops" and self._queues[queue].waiting >= MOST_WAITING:
@@ -507,8 +546,8 @@ class HttpGateway:
         if user is None:
             return
         user.lines -= 1
-        if user.lines == 0 and not user.session.may_be_silent:
-            user.session.lose_motion(f"{user.settings.name} hung up")
+        if user.lines == 0:
+            user.session.hang_up()
 
     async def _follow(
         self, word: Mapping[str, Any], line: WebSocketLine, ends: list[Unfollow]

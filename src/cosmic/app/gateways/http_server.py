@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+from collections.abc import Callable
 from typing import Final
 
 import uvicorn
@@ -9,6 +10,7 @@ from starlette.applications import Starlette
 from typing_extensions import override
 
 from cosmic.app.configuration.gateways import HttpSettings
+from cosmic.app.gateways.line_watch import keep_watch
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.network.station import Station
 from cosmic.frame.threads import WorkerThread
@@ -20,14 +22,26 @@ PING_S: Final = 0.4
 
 
 class HttpServer(WorkerThread):
-    """Serves an application in a loop of its own, and ends the right to move of the silent."""
+    """Serves an application in a loop of its own, and ends the right to move of the silent.
+
+    Parameters
+    ----------
+    look : callable
+        Called every `BEAT_S`; it returns at once.
+    """
 
     def __init__(
-        self, application: Starlette, bound: socket.socket, settings: HttpSettings, station: Station
+        self,
+        application: Starlette,
+        bound: socket.socket,
+        settings: HttpSettings,
+        station: Station,
+        look: Callable[[], object],
     ) -> None:
         super().__init__(f"{station.name} over HTTP", station.policy)
         self._bound = bound
         self._lease = station.lease
+        self._look = look
         self._server = uvicorn.Server(
             uvicorn.Config(
                 application,
@@ -61,10 +75,11 @@ class HttpServer(WorkerThread):
             watching.cancel()
 
     async def _watch(self) -> None:
-        """Let the right to move lapse of whoever fell silent."""
+        """Let the right to move lapse of whoever fell silent, and end what moves before."""
         while True:
             await asyncio.sleep(BEAT_S)
             self._lease.poll()
+            self._look()
 
     @override
     def request_end(self) -> None:
@@ -87,6 +102,7 @@ def listening(settings: HttpSettings) -> socket.socket:
         made = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
         try:
             made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            keep_watch(made)  # what it accepts inherits it
             made.bind((host, port))
             made.listen(MOST_CONNECTIONS)  # from now on who comes is answered, if a little later
         except OSError:

@@ -16,7 +16,7 @@ from cosmic.frame.network.errors import CallRefused
 from cosmic.frame.version import __version__
 
 USUAL_KEEP_S: Final = 30.0
-"""So much silence a program bears that takes the right to move: it thinks between two calls."""
+"""So long a program may be silent and keep the right to move: it thinks between two calls."""
 PROTOCOL: Final = "2025-06-18"
 _NO_METHOD: Final = -32601
 _BAD_PARAMS: Final = -32602
@@ -160,8 +160,9 @@ def _fixed_tools(kinds: Iterable[str]) -> list[dict[str, Any]]:
             "take_control",
             "Take the right to move",
             "One program at a time moves things. The right is kept for keep_s seconds after your "
-            "last call, at most as long as the platform allows; then what moves for you ends. Call "
-            "it again, or any other tool, before. Jogs end after 0.3 s in any case.",
+            "last call, at most as long as the platform allows. What moves for you ends 1 s after "
+            "your last call was answered, unless your client holds the event stream of this "
+            "session open: wait for its end with follow_operation.",
             {"keep_s": {**seconds, "default": USUAL_KEEP_S}},
         ),
         _tool(

@@ -72,6 +72,7 @@ class GatewaySession:
         self._caller = Caller(name, secrets.token_hex(16), access, door=door)
         self._approve = approve
         self._keep_s = MOVE_LIMIT_S
+        self._heard_s = station.clock.now_s()
         self._numbers = count(1)
         self._lock = Lock()
         self._operations: OrderedDict[str, Operation[Any]] = OrderedDict()
@@ -102,7 +103,7 @@ class GatewaySession:
         in_process : bool
             Whoever calls sees to it by itself that the program is alive.
         keep_s : float
-            How long the program may be silent.
+            How long the program may be silent and keep the right; what it moves ends before.
 
         Raises
         ------
@@ -125,7 +126,20 @@ class GatewaySession:
 
     def beat(self) -> None:
         """Note a heartbeat of the program."""
-        self._station.lease.beat(self._caller.token, self._station.clock.now_s())
+        self._heard_s = self._station.clock.now_s()
+        self._station.lease.beat(self._caller.token, self._heard_s)
+
+    def end_silent_motion(self) -> None:
+        """End what it moves where it has been silent too long for that; it may keep the right."""
+        if self._station.clock.now_s() - self._heard_s > MOVE_LIMIT_S:
+            self._tickets.cancel_motion()
+
+    def hang_up(self) -> None:
+        """End what it moves, for its last line is gone, and the right unless it may be silent."""
+        if self.may_be_silent:
+            self._tickets.cancel_motion()
+        else:
+            self.lose_motion(f"{self.name} hung up")
 
     def lose_motion(self, why: str) -> None:
         """End what it moves and take the right to move from it."""

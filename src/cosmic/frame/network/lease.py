@@ -107,8 +107,8 @@ class StationLease:
         in_process : bool
             The session lives and dies with this process, and so sends no heartbeats.
         keep_s : float
-            Silence that ends it and what moves by it. A motion without an end of its own bears no
-            more than before.
+            Silence that ends it. What moves bears no more than before, however long it is: a
+            program that thinks may keep the right, and one that is gone leaves nothing moving.
 
         Raises
         ------
@@ -188,8 +188,7 @@ class StationLease:
                 raise refusal(_refused(f"the right to move is held by {held.name}", advice))
         if held.in_process:
             return DeadMan(held.pulse, float("inf"))
-        longer = limit_s >= MOVE_LIMIT_S  # what is shorter has no end of its own: a jog
-        return DeadMan(held.pulse, max(held.pulse.limit_s, limit_s) if longer else limit_s)
+        return DeadMan(held.pulse, limit_s)
 
     def poll(self) -> None:
         """Let it lapse if its holder has fallen silent."""

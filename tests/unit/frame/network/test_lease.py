@@ -4,6 +4,7 @@ import pytest
 
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import MoveRefused
+from cosmic.frame.network.caller import MOVE_LIMIT_S
 from cosmic.frame.network.dead_man import DeadMan, Pulse
 from cosmic.frame.network.lease import LeaseState, StationLease
 from cosmic.frame.verdict import Reason
@@ -65,6 +66,21 @@ def test_a_late_sign_of_life_revives_nothing_even_if_nobody_looked(
     clock.advance(1.5)
     lease.beat("a", clock.now_s())
     assert dead_man.expired
+
+
+def test_who_may_be_silent_keeps_the_right_and_nothing_that_moves(
+    lease: StationLease, clock: ManualClock
+) -> None:
+    lease.take("assistant", "far", keep_s=30.0)
+    moving = lease.dead_man("far")
+    clock.advance(MOVE_LIMIT_S + 0.1)
+    assert moving.expired
+    assert lease.holds("far")
+    lease.beat("far", clock.now_s())
+    assert moving.expired, "going on needs a new command"
+    assert not lease.dead_man("far").expired
+    clock.advance(30.1)
+    assert not lease.holds("far")
 
 
 def test_signs_of_life_keep_it(lease: StationLease, clock: ManualClock) -> None:
