@@ -31,7 +31,13 @@ def child(*arguments):
     )
 
 
-KILLED = (ImageFormat.FFV1, ImageFormat.FAST, ImageFormat.STACK, ImageFormat.TIFF)
+KILLED = (
+    ImageFormat.FFV1,
+    ImageFormat.FAST,
+    ImageFormat.STACK,
+    ImageFormat.ZARR,
+    ImageFormat.TIFF,
+)
 
 
 @pytest.fixture(scope="module")

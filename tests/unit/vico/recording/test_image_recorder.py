@@ -276,7 +276,9 @@ def test_a_recording_that_is_there_stays_unless_it_may_go(recorders):
 
 
 def test_pixels_that_a_format_cannot_keep_are_refused_at_the_start(tmp_path, recorders):
-    with pytest.raises(RecordingError, match=r"small cannot keep .* ffv1, fast, stack, tiff, png"):
+    with pytest.raises(
+        RecordingError, match=r"small cannot keep .* ffv1, fast, stack, zarr, tiff, png"
+    ):
         recorders("run", ImageFormat.SMALL, settings=settings(PixelFormat.MONO12))
     assert list(tmp_path.iterdir()) == []
 

@@ -135,5 +135,5 @@ def test_a_missing_library_is_reported_before_anything_is_written(tmp_path, monk
 
 
 def test_an_unknown_format_lists_those_there_are():
-    with pytest.raises(RecordingError, match="ffv1, fast, small, stack, tiff, png"):
+    with pytest.raises(RecordingError, match="ffv1, fast, small, stack, zarr, tiff, png"):
         traits("mp4")

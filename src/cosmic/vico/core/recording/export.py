@@ -25,6 +25,7 @@ from cosmic.vico.core.recording.reading import (
 )
 from cosmic.vico.core.recording.sequence_writer import image_files
 from cosmic.vico.core.recording.side_row import UNKNOWN, SideRow
+from cosmic.vico.core.recording.zarr_store import is_zarr
 
 PART: Final = "being exported"
 Progress = Callable[[float], object]
@@ -109,11 +110,17 @@ def _check_free(target: Path, recording: ImageRecording, *, overwrite: bool) -> 
             raise RecordingExistsError(
                 f"{path}: there is such a file; choose another name, or say that it may be replaced"
             )
-    if target.is_dir() and set(target.iterdir()) - set(image_files(target, target.name).values()):
+    if _has_other_files(target):
         raise RecordingError(
             f"{target}: there are other files in this directory, which would be lost; choose "
             "another name"
         )
+
+
+def _has_other_files(target: Path) -> bool:
+    if not target.is_dir() or is_zarr(target):
+        return False
+    return bool(set(target.iterdir()) - set(image_files(target, target.name).values()))
 
 
 def _copy(

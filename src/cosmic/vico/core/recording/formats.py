@@ -23,6 +23,7 @@ class ImageFormat(StrEnum):
     FAST = "fast"
     SMALL = "small"
     STACK = "stack"
+    ZARR = "zarr"
     TIFF = "tiff"
     PNG = "png"
 
@@ -39,6 +40,8 @@ class Traits:
         Of the file, or of each image of a sequence.
     sequence : bool
         A directory with a file an image, not one file.
+    store : bool
+        A directory that is one thing to programs, with an ending of its own.
     lossless : bool
         Every pixel comes back as it was.
     ratio : float
@@ -58,6 +61,7 @@ class Traits:
     lossless: bool
     ratio: float
     sequence: bool = False
+    store: bool = False
     codec: str = ""
     container: str = ""
     coded: Mapping[PixelFormat, str] | None = None
@@ -112,6 +116,13 @@ FORMATS: Final[Mapping[ImageFormat, Traits]] = {
         lossless=True,
         ratio=1.0,
     ),
+    ImageFormat.ZARR: Traits(
+        text="OME-Zarr, uncompressed, for long series",
+        suffix=".zarr",
+        lossless=True,
+        ratio=1.0,
+        store=True,
+    ),
     ImageFormat.TIFF: Traits(
         text="a TIFF an image, uncompressed",
         suffix=".tif",
@@ -129,7 +140,8 @@ FORMATS: Final[Mapping[ImageFormat, Traits]] = {
 }
 
 # Endings that would say something else than what is in the file.
-_MEANT: Final = {".mkv", ".nut", ".avi", ".mp4", ".mov", ".tif", ".tiff", ".png", SIDE_SUFFIX}
+_FILES: Final = {".mkv", ".nut", ".avi", ".mp4", ".mov", ".tif", ".tiff", ".png"}
+_MEANT: Final = {*_FILES, ".zarr", SIDE_SUFFIX}
 
 
 def traits(image_format: ImageFormat | str) -> Traits:

@@ -1,5 +1,6 @@
 """`ImageFile`: a recording of images being written, without a thread of its own."""
 
+import shutil
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +20,7 @@ from cosmic.vico.core.recording.side_file import SideFile
 from cosmic.vico.core.recording.side_row import SideRow
 from cosmic.vico.core.recording.stack_writer import StackWriter
 from cosmic.vico.core.recording.video_writer import VideoWriter, check_codec
+from cosmic.vico.core.recording.zarr_store import ZarrWriter, is_zarr
 from cosmic.vico.hw.interface import PixelFormat, Pixels
 
 
@@ -147,6 +149,8 @@ class ImageFile:
         try:
             if self._writer is not None:
                 self._writer.close()
+            elif traits(self._format).store:
+                self._path.rmdir()
             elif not traits(self._format).sequence:
                 self._path.unlink(missing_ok=True)  # a video without an image is none
             self._side.close(complete=complete)
@@ -155,7 +159,11 @@ class ImageFile:
 
     def _create(self, *, overwrite: bool) -> None:
         try:
-            if traits(self._format).sequence:
+            if traits(self._format).store:
+                if overwrite and is_zarr(self._path):
+                    shutil.rmtree(self._path)
+                self._path.mkdir()
+            elif traits(self._format).sequence:
                 self._path.mkdir(exist_ok=overwrite)
                 for each in image_files(self._path, self._stem).values():
                     each.unlink()
@@ -177,6 +185,8 @@ class ImageFile:
             )
         if found.sequence:
             return SequenceWriter(self._path, self._format, self._stem, self._axes)
+        if self._format is ImageFormat.ZARR:
+            return ZarrWriter(self._path, self._axes, self._rate_hz)
         if self._format is ImageFormat.STACK:
             return StackWriter(self._path, self._axes)
         return VideoWriter(self._path, self._format, shape, pixel_format, self._rate_hz)
@@ -186,12 +196,17 @@ def _check_alone(path: Path, side_path: Path) -> None:
     """Refuse to take the side file of a recording in another format."""
     for suffix in {recording_suffix(each) for each in ImageFormat}:
         other = side_path.with_name(side_path.stem + suffix)
-        there = image_files(other, other.name) if other.is_dir() else other.is_file()
-        if other != path and there:
+        if other != path and _is_recording(other):
             raise RecordingError(
                 f"{other} is a recording in another format, which {side_path.name} belongs to; "
                 "choose another name"
             )
+
+
+def _is_recording(path: Path) -> bool:
+    if not path.is_dir():
+        return path.is_file()
+    return is_zarr(path) or bool(image_files(path, path.name))
 
 
 def _said(kind: tuple[tuple[int, ...], str, PixelFormat] | None) -> str:

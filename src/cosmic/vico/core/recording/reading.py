@@ -24,6 +24,7 @@ from cosmic.vico.core.recording.sources import (
     VideoSource,
 )
 from cosmic.vico.core.recording.video_writer import TimeStamps
+from cosmic.vico.core.recording.zarr_store import ZarrSource, is_zarr
 from cosmic.vico.hw.interface import FrameStatus, PixelFormat, Pixels
 
 _ENDINGS: Final = tuple(dict.fromkeys(recording_suffix(each) for each in ImageFormat))
@@ -199,6 +200,8 @@ class ImageRecording:
         return self._written[index] if index < len(self._written) else None
 
     def _opened(self) -> ImageSource | None:
+        if is_zarr(self._path):
+            return ZarrSource(self._path)
         if self._path.is_dir():
             return SequenceSource(self._path)
         if not self._path.exists():  # nothing came: a video without an image is not kept
