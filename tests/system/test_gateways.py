@@ -8,10 +8,11 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import httpx
 import numpy as np
@@ -27,6 +28,8 @@ TUTORIALS: Final = ROOT / "docs" / "tutorials"
 ADDRESS: Final = "http://127.0.0.1:8470"
 
 CHILD: Final = Path(__file__).with_name("ophyd_child.py")
+MAJOR: Final = 2
+ASYNC_CHILD: Final = Path(__file__).with_name("ophyd_async_child.py")
 
 
 @dataclass
@@ -79,11 +82,30 @@ def of_epics(served: Served) -> dict[str, str]:
     }
 
 
-def test_ophyds_motor_drives_an_axis_unchanged(served: Served, tmp_path: Path) -> None:
-    complaints = tmp_path / "complaints.txt"
+class Child:
+    """A client of EPICS that says what it found, and goes on when it is told to."""
+
+    def __init__(self, process: "subprocess.Popen[str]", complaints: Path) -> None:
+        self._process, self._complaints = process, complaints
+
+    def found(self) -> Any:
+        assert self._process.stdout is not None
+        said = self._process.stdout.readline()
+        assert said, self._complaints.read_text()
+        return json.loads(said)
+
+    def go_on(self) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write("\n")
+        self._process.stdin.flush()
+
+
+@contextmanager
+def client(script: Path, served: Served, folder: Path) -> Iterator[Child]:
+    complaints = folder / "complaints.txt"
     with complaints.open("w") as stderr:
-        client = subprocess.Popen(
-            [sys.executable, "-W", "ignore", str(CHILD)],
+        process = subprocess.Popen(
+            [sys.executable, "-W", "ignore", str(script)],
             env=of_epics(served),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -91,11 +113,15 @@ def test_ophyds_motor_drives_an_axis_unchanged(served: Served, tmp_path: Path) -
             text=True,
         )
     try:
-        assert client.stdin is not None
-        assert client.stdout is not None
-        said = client.stdout.readline()
-        assert said, complaints.read_text()
-        found = json.loads(said)
+        yield Child(process, complaints)
+    finally:
+        process.kill()
+        process.communicate(timeout=10)
+
+
+def test_ophyds_motor_drives_an_axis_unchanged(served: Served, tmp_path: Path) -> None:
+    with client(CHILD, served, tmp_path) as ophyd:
+        found = ophyd.found()
         assert found["without control"] == "UnknownStatusFailure"
         assert found["with control"] == pytest.approx(10.0, abs=1.0)
         assert found["again"] == [pytest.approx(10.0, abs=1.0)] * 5
@@ -115,13 +141,24 @@ def test_ophyds_motor_drives_an_axis_unchanged(served: Served, tmp_path: Path) -
         assert (image["kind"], image["colours"]) == ("UInt8", "Mono")
         assert image["of"] == "microscope"
         assert served.http.post("/api/mico/stop", json={"reason": "test"}).is_success
-        client.stdin.write("\n")
-        client.stdin.flush()
-        stopped = json.loads(client.stdout.readline())
-        assert stopped == {"while stopped": "UnknownStatusFailure", "alarm": 18}  # DISABLE
-    finally:
-        client.kill()
-        client.communicate(timeout=10)
+        ophyd.go_on()
+        stopped = {"while stopped": "UnknownStatusFailure", "alarm": 18}  # DISABLE
+        assert ophyd.found() == stopped
+    assert wait_until(lambda: served.http.get("/api/station").json()["control"]["local"], 5.0)
+
+
+@pytest.mark.skipif(find_spec("ophyd_async") is None, reason="there is no ophyd-async here")
+def test_ophyd_asyncs_motor_drives_an_axis_unchanged(served: Served, tmp_path: Path) -> None:
+    with client(ASYNC_CHILD, served, tmp_path) as ophyd:
+        found = ophyd.found()
+        assert found["without control"] == [pytest.approx(0.0, abs=50.0), MAJOR]
+        assert found["together"] == [pytest.approx(10.0, abs=1.0), pytest.approx(3.0, abs=0.1)]
+        assert found["scan"] == pytest.approx([0.0, 5.0, 10.0, 15.0, 20.0], abs=1.0)
+        assert found["units"] == {"motor": "um", "force": "uN"}
+        assert found["beyond"] == "MotorLimitsError"
+        assert served.http.post("/api/mico/stop", json={"reason": "test"}).is_success
+        ophyd.go_on()
+        assert ophyd.found() == {"while stopped": [pytest.approx(20.0, abs=1.0), MAJOR]}
     assert wait_until(lambda: served.http.get("/api/station").json()["control"]["local"], 5.0)
 
 
