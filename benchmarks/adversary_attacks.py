@@ -174,7 +174,7 @@ class AxisAttack(Attack):
 
     def _several(self, value: Callable[[Axis], float]) -> dict[str, float]:
         chosen = self.chance.sample(self._axes, self.chance.randint(1, 6))
-        return {axis.name.replace("_", ".", 1): value(axis) for axis in chosen}
+        return {axis.key: value(axis) for axis in chosen}
 
     def _group(self) -> None:
         self._rig.mico.move(
@@ -186,11 +186,11 @@ class AxisAttack(Attack):
 
     def _link(self) -> None:
         one, other = self.chance.sample(self._axes, 2)
-        names = (one.name.replace("_", ".", 1), other.name.replace("_", ".", 1))
+        names = (one.key, other.key)
         self._rig.mico.link(*names, self.chance.choice((1.0, -1.0, 2.0, "abc", 0.0)))
 
     def _unlink(self) -> None:
-        self._rig.mico.unlink(self._axis().name.replace("_", ".", 1))
+        self._rig.mico.unlink(self._axis().key)
 
     def _undo(self) -> None:
         self._rig.mico.undo(wait=False)
@@ -223,7 +223,7 @@ class OrderAttack(Attack):
         places = [rig.mico[name].details.address for name in SWEPT]
         self._swept = {(place.device, place.channel) for place in places}
         for axis in self._axes:
-            device = rig.mico.application.manager.device(axis.name)
+            device = rig.mico.application.manager.device(axis.key)
             device.submit = self._remembering(device.submit)
         self.acts = [(1, self._replay), (2, self._forge), (1, self._steal)]
 
@@ -242,7 +242,7 @@ class OrderAttack(Attack):
             # With the holder's token this is no attack, but a run over the whole travel, which
             # the gate allows where it is clear, and which leads beyond the soft limits.
             order = order._replace(token="mine")
-        self._rig.mico.application.manager.device(axis.name).submit(order)
+        self._rig.mico.application.manager.device(axis.key).submit(order)
 
     def _epoch(self) -> int:
         mico = self._rig.mico.application

@@ -95,7 +95,7 @@ def collect(bench: Stand, count: int) -> Samples:
         axis = axes[number % len(axes)]
         # A target that nobody else uses, so that the call is known by it.
         counts = rng.choice((-1, 1)) * (20_000 + 2 * number + 1)
-        channel = bench.manager.address(axis.name).channel
+        channel = bench.manager.address(axis.key).channel
         traffic.hand_over(axis)
         began_s = time.perf_counter()
         movement = axis.commander.move_absolute(channel, counts / 10.0, "um")
@@ -106,7 +106,7 @@ def collect(bench: Stand, count: int) -> Samples:
         gate_s = sum(
             end_s - start_s
             for name, start_s, end_s in decisions
-            if name == axis.name and began_s <= start_s <= called_s
+            if name == axis.key and began_s <= start_s <= called_s
         )
         decisions.clear()
         samples.total.append(called_s - began_s)

@@ -63,7 +63,7 @@ def collect(bench: Stand, receiver: Receiver, count: int) -> list[Watched]:
         commander.position_changed.connect(receiver.on_position)
         commander.movement_ended.connect(receiver.on_ended)
     axes = [axis for axis in bench.mico if axis.unit == "um" and axis.limits is not None]
-    places = {axis.name: bench.manager.address(axis.name) for axis in axes}
+    places = {axis.key: bench.manager.address(axis.key) for axis in axes}
     names = {(place.device, place.channel): name for name, place in places.items()}
 
     def on_packet(when_s: float, args: tuple[Any, ...]) -> None:
@@ -86,12 +86,12 @@ def collect(bench: Stand, receiver: Receiver, count: int) -> list[Watched]:
         time.sleep(0.01)  # a COMPLETED of the halt that is late
         watched = Watched()
         receiver.ended.clear()
-        receiver.watched = {axis.name: watched}
+        receiver.watched = {axis.key: watched}
         way = rng.uniform(100.0, 500.0)
         position = axis.position_um or 0.0
         movement = axis.move_by(-way if position > 0.0 else way, wait=False)
         if not receiver.ended.wait(5.0):
-            raise RuntimeError(f"{axis.name}: nobody was told of the end of {movement!r}")
+            raise RuntimeError(f"{axis.key}: nobody was told of the end of {movement!r}")
         receiver.watched = {}
         done.append(watched)
         axis.halt()

@@ -146,7 +146,7 @@ def _call(bench: Any, count: int) -> float:
     from benchmarks.skew import CALL
 
     axis, echo = bench.mico["left.x"], _Echo()
-    channel = bench.manager.address(axis.name).channel
+    channel = bench.manager.address(axis.key).channel
     entered: SimpleQueue[float] = SimpleQueue()
     calls, bare = [], []
     for number in range(count):

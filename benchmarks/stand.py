@@ -233,15 +233,15 @@ class Traffic:
     def hand_over(self, axis: Axis) -> None:
         """Leave `axis` to somebody else, until `adopt`."""
         with self._lock:
-            self._current.pop(axis.name, None)
+            self._current.pop(axis.key, None)
 
     def adopt(self, axis: Axis, movement: Movement) -> None:
         """Go on with `axis` once `movement`, issued by somebody else, has ended."""
-        self._current[axis.name] = movement
+        self._current[axis.key] = movement
         movement.add_callback(lambda ended: self._on_ended(axis, ended))
 
     def _next(self, axis: Axis) -> None:
-        sign = self._sign[axis.name] = -self._sign.get(axis.name, -1)
+        sign = self._sign[axis.key] = -self._sign.get(axis.key, -1)
         if axis.limits is None:
             movement = axis.steps(sign * STEPS, frequency_hz=STEP_HZ, wait=False)
         else:
@@ -252,10 +252,10 @@ class Traffic:
 
     def _on_ended(self, axis: Axis, movement: Movement) -> None:
         with self._lock:
-            if not self._running or self._current.get(axis.name) is not movement:
+            if not self._running or self._current.get(axis.key) is not movement:
                 return
             error = movement.exception()
             if error is not None:  # never again and again, which would be another load
-                self.failures.append(f"{axis.name}: {error}")
+                self.failures.append(f"{axis.key}: {error}")
                 return
             self._next(axis)

@@ -27,12 +27,12 @@ def approach(rig: cosmic.Rig) -> None:
 def push(rig: cosmic.Rig) -> MsgGenerator:
     """Return the plan: the probe goes step by step, at each force and image are taken."""
     detectors = [rig.daqco["force"], rig.vico.camera()]
-    return scan(detectors, rig.mico["probe.y"].movable, FIRST_UM, LAST_UM, POINTS)
+    return scan(detectors, rig.mico["probe.y"], FIRST_UM, LAST_UM, POINTS)
 
 
 def into_the_probe(rig: cosmic.Rig) -> MsgGenerator:
     """Return a plan that would drive the jaws into the probe at its second point."""
-    return list_scan([rig.daqco["force"]], rig.mico["left.x"].movable, [3600.0, 4500.0])
+    return list_scan([rig.daqco["force"]], rig.mico["left.x"], [3600.0, 4500.0])
 
 
 def rehearse(name: str, plan: MsgGenerator) -> None:

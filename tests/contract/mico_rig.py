@@ -36,7 +36,7 @@ class HostedMico:
         manager.reset_stop()
         for axis in self.mico:
             axis.clear_zero()
-            self.mico.unlink(axis.name)
+            self.mico.unlink(axis.key)
             if axis.details.kind != "open-loop":
                 axis.set_closed_loop_frequency(manager.settings.defaults.closed_loop_frequency_hz)
         self.mico.move({"left.x": 0.0, "left.y": 0.0, "right.x": 0.0})

@@ -78,7 +78,6 @@ from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.move_status import MoveStatus
-from cosmic.mico.api.plan_movable import AxisMovable
 from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.api.poses import Poses
 from cosmic.mico.api.stepwise import StepwiseMove
@@ -129,7 +128,6 @@ CLASSES: Final[dict[str, type]] = {
     "Poses": Poses,
     "Pose": Pose,
     "Axis": Axis,
-    "AxisMovable": AxisMovable,
     "AxisGroup": AxisGroup,
     "MoveStatus": MoveStatus,
     "Movement": Movement,

@@ -110,7 +110,7 @@ def _platform_without_parts(submitted):
     addresses = {"left.x": (0, 0), "left.z": (0, 2), "probe.y": (2, 1), "table.rotation": (3, 0)}
 
     def device(name):
-        number = addresses[name.replace("_", ".", 1)][0]
+        number = addresses[name][0]
 
         def submit(order):
             submitted.append((number, order))
@@ -119,12 +119,12 @@ def _platform_without_parts(submitted):
 
     axes = {
         name: SimpleNamespace(
-            name=name.replace(".", "_"),
+            key=name,
             details=SimpleNamespace(address=SimpleNamespace(device=place[0], channel=place[1])),
         )
         for name, place in addresses.items()
     }
-    devices = {axis.name: device(axis.name) for axis in axes.values()}
+    devices = {axis.key: device(axis.key) for axis in axes.values()}
     manager = SimpleNamespace(
         device=devices.__getitem__,
         latch=SimpleNamespace(state=SimpleNamespace(epoch=0)),
@@ -146,7 +146,7 @@ def test_a_forged_run_over_the_whole_travel_is_nobody_s_right_but_on_the_axes_le
     rig, devices = _platform_without_parts(submitted)
     attack = OrderAttack(rig, 1)
     for _ in range(4000):
-        devices["left_z"].submit(Order(2, MoveTo(0.0, "um"), "the holder's"))
+        devices["left.z"].submit(Order(2, MoveTo(0.0, "um"), "the holder's"))
         attack.act()
     assert attack.raw == []
     sweeps = [(n, o) for n, o in submitted if isinstance(o.motion, Calibrate | Reference)]

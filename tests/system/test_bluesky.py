@@ -100,7 +100,7 @@ def standing_um(axis: Axis) -> float:
 @pytest.mark.parametrize("kind", ["axis", "group", "channel"])
 def test_devices_have_the_shapes_of_bluesky(rig: cosmic.Rig, kind: str) -> None:
     device, shapes = {
-        "axis": (rig.mico["left.x"].movable, ("Locatable", "Stoppable", "Checkable")),
+        "axis": (rig.mico["left.x"], ("Locatable", "Stoppable", "Checkable")),
         "group": (rig.mico.group("left.x", "left.y"), ("Locatable", "Stoppable", "Checkable")),
         "channel": (rig.daqco["force"], ("Triggerable", "Flyable", "EventPageCollectable")),
     }[kind]
@@ -116,7 +116,7 @@ def test_devices_have_the_shapes_of_bluesky(rig: cosmic.Rig, kind: str) -> None:
 
 
 def test_readings_are_stamped_with_the_time_of_the_day(rig: cosmic.Rig, x: Axis) -> None:
-    for device in (x.movable, rig.daqco["force"]):
+    for device in (x, rig.daqco["force"]):
         for reading in device.read().values():
             assert time.time() - 60.0 < reading["timestamp"] <= time.time()
 
@@ -133,7 +133,7 @@ def test_src_does_not_import_bluesky() -> None:
 def test_a_scan_reads_the_force_at_every_place(
     rig: cosmic.Rig, engine: RunEngine, x: Axis, documents: Documents
 ) -> None:
-    engine(scan([rig.daqco["force"]], x.movable, 0.0, 100.0, 3))
+    engine(scan([rig.daqco["force"]], x, 0.0, 100.0, 3))
     assert [each["left_x"] for each in events(documents)] == pytest.approx([0, 50, 100], abs=1.0)
     for each in events(documents):
         assert each["force"] == pytest.approx(1.0, abs=0.5)
@@ -145,7 +145,7 @@ def test_a_grid_of_two_axes_visits_every_place(
     rig: cosmic.Rig, engine: RunEngine, x: Axis, documents: Documents
 ) -> None:
     y = rig.mico["left.y"]
-    engine(grid_scan([], x.movable, 0.0, 20.0, 2, y.movable, 0.0, 40.0, 2, snake_axes=True))
+    engine(grid_scan([], x, 0.0, 20.0, 2, y, 0.0, 40.0, 2, snake_axes=True))
     there = [(each["left_x"], each["left_y"]) for each in events(documents)]
     assert np.array(there) == pytest.approx(np.array([(0, 0), (0, 40), (20, 40), (20, 0)]), abs=1.0)
 
@@ -164,16 +164,16 @@ def test_a_relative_scan_comes_back_to_where_it_began(
     rig: cosmic.Rig, engine: RunEngine, x: Axis, documents: Documents
 ) -> None:
     x.move_to(30.0)
-    engine(rel_scan([], x.movable, -10.0, 10.0, 2))
+    engine(rel_scan([], x, -10.0, 10.0, 2))
     assert [each["left_x"] for each in events(documents)] == pytest.approx([20, 40], abs=1.0)
     assert x.position_um == pytest.approx(30.0, abs=1.0)
 
 
 def test_the_setpoint_is_what_a_plan_asked_for_until_something_else_moves_it(x: Axis) -> None:
-    x.movable.set(12.5).wait(5.0)
-    assert x.movable.locate()["setpoint"] == 12.5
+    x.set(12.5).wait(5.0)
+    assert x.locate()["setpoint"] == 12.5
     x.move_to(50.0)
-    where = x.movable.locate()
+    where = x.locate()
     assert where["setpoint"] == where["readback"] == pytest.approx(50.0, abs=1.0)
 
 
@@ -183,11 +183,11 @@ def test_the_setpoint_is_what_a_plan_asked_for_until_something_else_moves_it(x: 
 def test_limits_and_collisions_are_found_without_moving(rig: cosmic.Rig, x: Axis) -> None:
     before = x.position_um
     with pytest.raises(cosmic.LimitError):
-        check_limits(scan([], x.movable, 0.0, 9000.0, 3))
+        check_limits(scan([], x, 0.0, 9000.0, 3))
     with pytest.raises(cosmic.CollisionError, match="jaw"):
         group = rig.mico.group("left.x", "right.x")
         check_limits(list_scan([], group, [(0.0, 0.0), (4000.0, -4000.0)]))
-    check_limits(scan([], x.movable, 0.0, 100.0, 3))
+    check_limits(scan([], x, 0.0, 100.0, 3))
     assert x.position_um == pytest.approx(before, abs=0.5)
 
 
@@ -196,7 +196,7 @@ def test_a_refused_move_ends_the_plan_as_a_failure(
     engine: RunEngine, x: Axis, documents: Documents, target: Any
 ) -> None:
     with pytest.raises(FailedStatus) as failed:
-        engine(list_scan([], x.movable, [10.0, target]))
+        engine(list_scan([], x, [10.0, target]))
     assert isinstance(failed.value.__cause__, cosmic.MoveRefused)
     assert ending(documents) == "fail"
     assert x.position_um == pytest.approx(10.0, abs=1.0)
@@ -235,7 +235,7 @@ def test_a_stop_in_the_middle_of_a_plan_ends_it_as_a_failure(
     x.set_closed_loop_frequency(SLOW_HZ)
     forget = at(x, 20.0, lambda: rig.stop("enough"))
     with pytest.raises(FailedStatus) as failed:
-        engine(scan([], x.movable, 0.0, 3000.0, 2))
+        engine(scan([], x, 0.0, 3000.0, 2))
     forget()
     assert isinstance(failed.value.__cause__, cosmic.StoppedError)
     assert ending(documents) == "fail"
@@ -260,7 +260,7 @@ def test_a_paused_plan_stands_still_and_makes_its_move_again(
     x.set_closed_loop_frequency(SLOW_HZ)
     forget = at(x, 20.0, engine.request_pause)
     with pytest.raises(RunEngineInterrupted):
-        engine(scan([], x.movable, 0.0, 2000.0, 2))
+        engine(scan([], x, 0.0, 2000.0, 2))
     forget()
     assert standing_um(x) < 1900.0
     x.set_closed_loop_frequency(FAST_HZ)
@@ -275,7 +275,7 @@ def test_an_aborted_plan_leaves_nothing_moving(
     x.set_closed_loop_frequency(SLOW_HZ)
     forget = at(x, 20.0, engine.request_pause)
     with pytest.raises(RunEngineInterrupted):
-        engine(scan([], x.movable, 0.0, 2000.0, 2))
+        engine(scan([], x, 0.0, 2000.0, 2))
     forget()
     engine.abort("enough")
     assert ending(documents) == "abort"
@@ -289,11 +289,11 @@ def test_what_moves_and_what_is_felt_is_monitored_during_a_plan(
     rig: cosmic.Rig, engine: RunEngine, x: Axis, documents: Documents
 ) -> None:
     x.set_closed_loop_frequency(SLOW_HZ * 20)
-    watched = [x.movable, rig.daqco["force"].live, rig.mico.live_clearance]
+    watched = [x, rig.daqco["force"].live, rig.mico.live_clearance]
     for device in watched:
         assert isinstance(device, protocols.Subscribable | protocols.Readable)
-    y = rig.mico["left.y"].movable
-    engine(monitor_during_wrapper(scan([y], x.movable, 0.0, 300.0, 2), watched))
+    y = rig.mico["left.y"]
+    engine(monitor_during_wrapper(scan([y], x, 0.0, 300.0, 2), watched))
     streams = {
         document["uid"]: document["name"] for name, document in documents if name == "descriptor"
     }
@@ -326,7 +326,7 @@ def test_a_plan_is_suspended_while_the_force_is_too_high_and_then_goes_on(
     try:
         wait_until(lambda: force.live.get() > 300.0)
         begun_s = time.monotonic()
-        engine(scan([], x.movable, 0.0, 20.0, 2))
+        engine(scan([], x, 0.0, 20.0, 2))
     finally:
         engine.remove_suspender(suspender)
         rig.daqco.set_scale("force", scale)
@@ -345,7 +345,7 @@ def test_a_plan_stops_moving_while_bodies_are_too_near(
     threading.Timer(0.7, engine.request_pause).start()
     try:
         with pytest.raises(RunEngineInterrupted):
-            engine(scan([], x.movable, 100.0, 200.0, 2))
+            engine(scan([], x, 100.0, 200.0, 2))
     finally:
         engine.remove_suspender(suspender)
     assert standing_um(x) == pytest.approx(0.0, abs=1.0)
@@ -361,7 +361,7 @@ def test_settings_that_a_plan_changes_are_in_its_documents(
     force, group = rig.daqco["force"], rig.mico.group("left.x", "left.y")
 
     def plan() -> Any:
-        old, new = yield from bps.configure(x.movable, {"frequency_hz": 1000})
+        old, new = yield from bps.configure(x, {"frequency_hz": 1000})
         assert new["left_x_frequency_hz"]["value"] == 1000 != old["left_x_frequency_hz"]["value"]
         yield from bps.configure(force, {"force_average_s": 0.05})
         yield from bps.configure(group, {"left_y_frequency_hz": 2000})
@@ -375,11 +375,11 @@ def test_settings_that_a_plan_changes_are_in_its_documents(
     assert told["left_x_and_left_y"]["data"]["left_y_frequency_hz"] == 2000
     force.average_s = 0.1
     rig.mico["left.y"].set_closed_loop_frequency(FAST_HZ)
-    for device, wrong in ((x.movable, "zero"), (force, "rate_hz"), (group, "right_x_frequency_hz")):
+    for device, wrong in ((x, "zero"), (force, "rate_hz"), (group, "right_x_frequency_hz")):
         with pytest.raises(cosmic.ConfigError, match="cannot be set"):
             device.configure({wrong: 1})
     with pytest.raises(cosmic.MoveRefused):
-        x.movable.configure({"frequency_hz": 10**6})
+        x.configure({"frequency_hz": 10**6})
 
 
 def test_a_group_goes_to_distances_and_comes_back(
@@ -397,7 +397,7 @@ def test_a_group_with_a_name_is_read_beside_its_own_axes(
 ) -> None:
     arm = rig.mico.group("left.x", "left.y", name="arm")
     assert arm.read().keys() == arm.describe().keys() == {"arm_left_x", "arm_left_y"}
-    engine(list_scan([x.movable], arm, [(5.0, 0.0), (10.0, 5.0)]))
+    engine(list_scan([x], arm, [(5.0, 0.0), (10.0, 5.0)]))
     for each in events(documents):
         assert each["left_x"] == pytest.approx(each["arm_left_x"], abs=1.0)
 
@@ -461,7 +461,7 @@ def test_every_sample_of_a_flight_is_collected_once(
     rig: cosmic.Rig, engine: RunEngine, x: Axis, documents: Documents
 ) -> None:
     force = rig.daqco["force"]
-    engine(fly_during_wrapper(scan([force], x.movable, 0.0, 50.0, 2), [force]))
+    engine(fly_during_wrapper(scan([force], x, 0.0, 50.0, 2), [force]))
     pages = [document for name, document in documents if name == "event_page"]
     times_s = np.concatenate([each["data"]["force_time_s"] for each in pages])
     assert np.diff(times_s) == pytest.approx(1.0 / rig.daqco.rate_hz, abs=1e-9)
@@ -515,7 +515,7 @@ def test_a_camera_in_a_scan_keeps_a_fresh_image_of_every_place(
         camera.plan_images(tmp_path, suffix=".png")
         (tmp_path / f"{camera.name}_00007.png").touch()
         camera.plan_images(tmp_path, suffix=".png", fibres=True)
-        engine(scan([camera], rig.mico["right.x"].movable, 0.0, 100.0, 2))
+        engine(scan([camera], rig.mico["right.x"], 0.0, 100.0, 2))
         external = {f"{camera.name}_image"}
         assert camera.read().keys() | external == camera.describe().keys()
         assert set(camera.hints["fields"]) <= camera.read().keys()

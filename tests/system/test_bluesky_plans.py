@@ -53,7 +53,7 @@ def test_a_plan_of_bluesky_runs_unchanged(rig: cosmic.Rig, name: str) -> None:
         assert document.get("exit_status", "success") == "success"
 
     engine.subscribe(hear)
-    x, y = (rig.mico[each].movable for each in ("left.x", "left.y"))
+    x, y = (rig.mico[each] for each in ("left.x", "left.y"))
     engine(plan(x, y, rig.daqco["force"]))
     assert len(read) >= least
     assert all("force" in each for each in read)

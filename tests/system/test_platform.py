@@ -39,7 +39,7 @@ def test_a_cold_platform_knows_nothing_until_it_is_initialised():
         for axis in sensors:
             shown = axis.details.position
             assert shown == pytest.approx(0.0, abs=2.0)
-            assert scene.truth()[axis.name] == pytest.approx(shown, abs=20.0)
+            assert scene.truth()[axis.key] == pytest.approx(shown, abs=20.0)
 
 
 def test_steps_move_the_truth_and_stay_an_estimate():
@@ -225,6 +225,6 @@ def test_random_commands_never_leave_the_limits_and_never_hang():
             for other in axes:
                 if other.limits is not None:
                     low, high = other.limits
-                    assert low - 1.0 <= scene.truth()[other.name] <= high + 1.0
+                    assert low - 1.0 <= scene.truth()[other.key] <= high + 1.0
         wait_until(lambda: all(axis.state is not Status.BUSY for axis in axes), 20)
         assert not mico.application.manager.gate.held()

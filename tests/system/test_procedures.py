@@ -104,7 +104,7 @@ def wait_for(axis: Axis, beyond_um: float) -> None:
         if abs(axis.position_um) > beyond_um:
             return
         pause.wait(0.002)
-    raise AssertionError(f"{axis.name} does not move")
+    raise AssertionError(f"{axis.key} does not move")
 
 
 def standing(rig: cosmic.Rig) -> bool:

@@ -201,7 +201,7 @@ def site(shared: Site) -> Iterator[Site]:
         if axis.limits is not None:
             axis.set_closed_loop_frequency(18500)
     wait_until(lambda: not shared.moving())
-    start = {axis.name: 0.0 for axis in mico if axis.limits is not None}
+    start = {axis.key: 0.0 for axis in mico if axis.limits is not None}
     mico.move(start)
     for name in start:
         mico[name].set_closed_loop_frequency(300)

@@ -3,6 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from threading import RLock
 
 from cosmic.frame.errors import CosmicError
@@ -34,10 +35,11 @@ class PlanSignal:
 
     def subscribe(
         self, function: Callable[..., object], event_type: object = None, run: bool = True
-    ) -> None:
+    ) -> Unsubscribe:
         """Call ``function(value=..., timestamp=..., obj=self)`` at each new value.
 
-        It is called in the thread that has the value and must return at once.
+        It is called in the thread that has the value and must return at once. Returns the function
+        that ends it, as `clear_sub` does.
 
         Parameters
         ----------
@@ -66,6 +68,7 @@ class PlanSignal:
         self._subscribed = (*self._subscribed, (function, end))
         if run:
             publish()
+        return partial(self.clear_sub, function)
 
     def clear_sub(self, function: Callable[..., object]) -> None:
         """End a subscription, and wait for a call under way; harmless where there is none."""

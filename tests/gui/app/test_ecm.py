@@ -85,7 +85,7 @@ def moving(window: OperatorWindow) -> bool:
 
 
 def where(window: OperatorWindow) -> dict[str, float | None]:
-    return {axis.name: axis.details.position for axis in mico(window).mico}
+    return {axis.key: axis.details.position for axis in mico(window).mico}
 
 
 def test_in_mcm_a_blocked_move_is_refused_with_a_hint(window: OperatorWindow, qtbot: QtBot) -> None:

@@ -29,7 +29,7 @@ def card(request: pytest.FixtureRequest, panel: MicoWidget) -> PositionerBaseGUI
 
 
 def switch(card: PositionerBaseGUI) -> CollisionSwitch:
-    return part(card, NAMES[card.axis.name], CollisionSwitch)
+    return part(card, NAMES[card.axis.key], CollisionSwitch)
 
 
 def question(card: PositionerBaseGUI) -> TakeOutQuestion:
@@ -62,11 +62,11 @@ def test_taking_out_asks_once_more_and_is_loud_afterwards(
     qtbot.mouseClick(switch(card), Qt.MouseButton.LeftButton)
     assert card.axis.collision_detection
     asked = " ".join(label.text() for label in question(card).findChildren(QLabel))
-    assert f"Take {card.axis.name} out of collision detection?" in asked
+    assert f"Take {card.axis.key} out of collision detection?" in asked
     with caplog.at_level(logging.WARNING):
         qtbot.mouseClick(question(card).take_out, Qt.MouseButton.LeftButton)
     assert not card.axis.collision_detection
-    assert f"{card.axis.name} was taken out of collision detection by window" in caplog.text
+    assert f"{card.axis.key} was taken out of collision detection by window" in caplog.text
     qtbot.waitUntil(lambda: switch(card).text() == "CD OFF")
     assert switch(card).indicator.text() == "▲"
     assert "NOT checked" in part(card, "status", QLabel).text()
@@ -109,10 +109,10 @@ def test_taking_in_asks_nothing(card: PositionerBaseGUI, qtbot: QtBot) -> None:
 def test_the_switch_follows_what_a_script_changes(
     card: PositionerBaseGUI, panel: MicoWidget, qtbot: QtBot
 ) -> None:
-    model(panel).take_out(card.axis.name)
+    model(panel).take_out(card.axis.key)
     qtbot.waitUntil(lambda: switch(card).text() == "CD OFF")
     assert sum(switch_of.text() == "CD OFF" for switch_of in switches(panel)) == 1
-    model(panel).take_in(card.axis.name)
+    model(panel).take_in(card.axis.key)
     qtbot.waitUntil(lambda: switch(card).text() == "CD on")
 
 

@@ -120,7 +120,7 @@ class FirstDaySteps:
             return Standing(State.ERROR, f"{mico.failure}. Check power and cable.", "Rescan")
         if not mico.ready:
             return Standing(State.BUSY, "Looking for devices")
-        absent = [axis.name for axis in mico if not axis.details.present]
+        absent = [axis.key for axis in mico if not axis.details.present]
         if absent:
             text = f"{len(absent)} axes of the platform file do not answer: {', '.join(absent)}"
             return Standing(State.ERROR, text, "Rescan")
@@ -147,7 +147,7 @@ class FirstDaySteps:
     def positions(self) -> Standing:
         """Look at what is known of the positions."""
         unknown = [
-            axis.name
+            axis.key
             for axis in self._gui.mico
             if axis.kind is not PositionerKind.OPEN_LOOP
             and axis.details.present

@@ -55,11 +55,11 @@ class GripperRow(QWidget):
         first, line = tight_row(STEP_PX // 2)
         for direction, text in ((-1, "close"), (1, "open")):
             button = styled(push_button(text, f"{text} the jaws by the step"), "narrow")
-            button.setAccessibleName(f"{axis.name} {text}")
+            button.setAccessibleName(f"{axis.key} {text}")
             button.clicked.connect(lambda _=False, d=direction: step(d))
             line.addWidget(button)
         self.width_field = named(
-            QuantityField("um", low=0.0, name=f"Opening of {axis.name}; Enter goes there"),
+            QuantityField("um", low=0.0, name=f"Opening of {axis.key}; Enter goes there"),
             "gripperWidth",
         )
         self.width_field.setMinimumWidth(9 * STEP_PX)

@@ -296,7 +296,7 @@ class PathController(QObject):
         self.offered.emit()
 
     def _positions(self) -> dict[str, float]:
-        states = {axis.name: axis.details for axis in self._mico}
+        states = {axis.key: axis.details for axis in self._mico}
         return {name: each.position for name, each in states.items() if each.position is not None}
 
     # Moving

@@ -231,7 +231,7 @@ class ScenePanel(QWidget):
         self._unknown.clear()
         try:
             for axis in self._mico:
-                self._feed.add(axis.name, self)
+                self._feed.add(axis.key, self)
         except CosmicError as exc:
             logger.debug("the scene is shown after the rescan: %s", exc)
         self._on_flushed()

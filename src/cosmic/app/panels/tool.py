@@ -96,7 +96,7 @@ class _TargetRow:
         widest = self.position.fontMetrics().horizontalAdvance("-5000.0")
         self.position.setMinimumWidth(widest)
         self.target = named(
-            QuantityField(axis.unit, name=f"Target of {axis.name}; Enter moves there"), "toolTarget"
+            QuantityField(axis.unit, name=f"Target of {axis.key}; Enter moves there"), "toolTarget"
         )
         self.target.setMinimumWidth(9 * STEP_PX)
         self.target.entered.connect(lambda _value: go())
@@ -334,7 +334,7 @@ class ToolPanel(QWidget):
         return button
 
     def _make_gripper(self, axis: Axis) -> QWidget:
-        name, tool = axis.name, self._tool
+        name, tool = axis.key, self._tool
         row = GripperRow(
             axis,
             lambda direction: self.move_once(name, direction),

@@ -89,7 +89,7 @@ class _Rules:
     def position_unknown(self) -> Step | None:
         """Look at what is known of the positions."""
         unknown = [
-            axis.name
+            axis.key
             for axis in self._gui.mico
             if axis.kind is not PositionerKind.OPEN_LOOP
             and axis.details.present

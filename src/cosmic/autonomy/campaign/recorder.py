@@ -86,7 +86,7 @@ class MotionLog:
         self._channel = channel
         self._clock = clock
         self._lock = Lock()
-        self._units = {axis.name: str(axis.unit) for axis in mico}
+        self._units = {axis.key: str(axis.unit) for axis in mico}
         self._force_unit = daqco.units[channel]
         self._kept: dict[str, list[tuple[float, float]]] = {}
         self._last: dict[str, float] = {}

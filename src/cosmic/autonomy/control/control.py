@@ -69,7 +69,7 @@ class Control:
     @property
     def axes(self) -> dict[str, str]:
         """Axes that a loop can move, with their units; those without sensor are left out."""
-        return {axis.name: axis.unit for axis in self._mico if axis.limits is not None}
+        return {axis.key: axis.unit for axis in self._mico if axis.limits is not None}
 
     def hold_force(
         self,

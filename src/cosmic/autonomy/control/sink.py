@@ -66,7 +66,7 @@ class AxisSink:
     @property
     def name(self) -> str:
         """Name of the axis."""
-        return self._axis.name
+        return self._axis.key
 
     @property
     def unit(self) -> str:

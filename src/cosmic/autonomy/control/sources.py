@@ -173,7 +173,7 @@ class PositionSource(Source):
     @property
     @override
     def name(self) -> str:
-        return self._axis.name
+        return self._axis.key
 
     @property
     @override

@@ -256,7 +256,7 @@ class CloseGently(FibreOperation):
         opening_um = axis.position_um
         if opening_um is None:
             raise OperationFailed(
-                "opening unknown", f"{axis.name}: its opening is unknown; initialise the platform"
+                "opening unknown", f"{axis.key}: its opening is unknown; initialise the platform"
             )
         base_un = yield from self._force_un(work)
         most_um = opening_um + work.settings.grasp.closing_um

@@ -37,7 +37,7 @@ from cosmic.mico.api.entry import (
 )
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.news import SentMotion
-from cosmic.mico.api.plan_movable import AxisMovable, PlanAxis, PlanMovable
+from cosmic.mico.api.plan_movable import PlanAxis, PlanMovable
 from cosmic.mico.api.remote_axis_state import RemoteAxisState
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.motion.device_commander import DeviceCommander
@@ -65,7 +65,7 @@ class Axis(PlanMovable, Declared):
 
     Positions are in `unit` from the user's zero (see `set_zero`). A number may be given as text
     with a unit of its own: ``axis.move_to("0.2 mm")``. It has the shape of a bluesky device
-    without importing bluesky; give plans `movable`, which has a name that bluesky admits.
+    without importing bluesky.
     """
 
     commander: DeviceCommander
@@ -78,7 +78,6 @@ class Axis(PlanMovable, Declared):
         self._channel = manager.address(name).channel
         self.commander = commander
         self._orders = AxisOrders(name, manager, commander)
-        self._movable = AxisMovable(self)
 
     @override
     def set_up_proxy(self, key: str, policy: FailurePolicy) -> None:
@@ -88,12 +87,10 @@ class Axis(PlanMovable, Declared):
         self._far = RemoteAxisState(key)
         self.commander = DeviceCommander("")  # tells what the station does, and commands nothing
         self._far.changed.subscribe(self._on_far_changed)
-        self._movable = AxisMovable(self)
 
     @property
     @override
-    def name(self) -> str:
-        """Name of the axis, such as "left.x"."""
+    def key(self) -> str:
         return self._name
 
     @property
@@ -114,9 +111,9 @@ class Axis(PlanMovable, Declared):
         return f"<Axis {self._name}: {where}, {state.status}, position {state.confidence}>"
 
     @property
-    def movable(self) -> AxisMovable:
-        """The axis for plans of bluesky, whose documents forbid the dot in its name."""
-        return self._movable
+    def movable(self) -> "Axis":
+        """The axis itself: plans take it as it is."""
+        return self
 
     # What is known
 
@@ -274,12 +271,8 @@ class Axis(PlanMovable, Declared):
             raise NotAvailable(f"{self._name} is a {state.kind} axis: use {other}")
         return state.shown_position
 
-    def subscribe(self, callback: Callable[[PositionerState], object]) -> Callable[[], None]:
-        """Call `callback(state)` after each change; returns the function that ends it.
-
-        It is called in the device's thread and must return at once; a position in motion is read
-        about 20 times a second.
-        """
+    @override
+    def _on_state(self, callback: Callable[[PositionerState], object]) -> Callable[[], None]:
         if self._far is not None:
             return self._far.changed.subscribe(callback)
 
@@ -309,7 +302,7 @@ class Axis(PlanMovable, Declared):
             if not like:
                 listener()
 
-        return self.subscribe(look)
+        return self._on_state(look)
 
     @override
     def note_change(self) -> None:

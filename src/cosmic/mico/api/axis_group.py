@@ -12,7 +12,7 @@ from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.entry import Number
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.move_status import MoveStatus, refused
-from cosmic.mico.api.plan_movable import AxisMovable
+from cosmic.mico.api.plan_movable import PlanMovable
 
 T = TypeVar("T")
 
@@ -51,7 +51,7 @@ class AxisGroup:
 
     def __init__(
         self,
-        axes: Mapping[str, AxisMovable],
+        axes: Mapping[str, PlanMovable],
         move: Callable[[Mapping[str, Number]], GroupMovement],
         check: Callable[[Mapping[str, Number]], MoveVerdict],
         name: str = "",

@@ -532,7 +532,7 @@ class Mico(Declared):
 
     def group(self, *names: str, name: str = "") -> AxisGroup:
         """Return axes that a bluesky plan moves as one; raises `UnknownAxisError`."""
-        axes = {each: self[each].movable for each in names}
+        axes = {each: self[each] for each in names}
         return AxisGroup(axes, lambda to: self.move(to, wait=False), self.check, name)
 
     def check(self, targets: Mapping[str, Number]) -> MoveVerdict:
@@ -837,7 +837,7 @@ class Mico(Declared):
             One of the axes linked moves.
         """
         linked = bool(self[axis].linked_to)
-        self.remove_links(self[axis].name)
+        self.remove_links(self[axis].key)
         return linked
 
     @command(moves=True, aside=True)

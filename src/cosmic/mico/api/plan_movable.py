@@ -1,5 +1,6 @@
-"""`PlanMovable`: an axis as plans of bluesky move it, under either of its names."""
+"""`PlanMovable`: an axis as plans of bluesky move it."""
 
+import inspect
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
@@ -67,27 +68,35 @@ class PlanAxis(Protocol):
     def set_closed_loop_frequency(self, frequency_hz: Number) -> None:
         """Limit the speed of movements to a position."""
 
-    @abstractmethod
-    def subscribe(self, callback: Callable[[PositionerState], object]) -> Callable[[], None]:
-        """Call `callback(state)` after each change."""
-
 
 @checked_class
-class PlanMovable:
-    """Movable, Readable, Configurable, Locatable, Stoppable and Checkable, without bluesky."""
+class PlanMovable(PlanSignal):
+    """Movable, Readable, Subscribable, Configurable, Locatable, Stoppable and Checkable.
+
+    Without bluesky. Plans can monitor it, and suspenders watch its position.
+    """
 
     parent: None = None
     _asked: tuple[float, MoveStatus] | None = None
 
     @property
     @abstractmethod
+    def key(self) -> str:
+        """What `rig.mico`, the platform file and verdicts call it, such as "left.x"."""
+
+    @property
     def name(self) -> str:
-        """Name of the axis, such as "left.x"."""
+        """Name in documents of bluesky, which forbid the dot, and in EPICS, such as "left_x"."""
+        return plain_name(self.key)
 
     @property
     @abstractmethod
     def _axis(self) -> PlanAxis:
         """What moves."""
+
+    @abstractmethod
+    def _on_state(self, callback: Callable[[PositionerState], object]) -> Unsubscribe:
+        """Call `callback(state)` after each change."""
 
     @property
     def _now(self) -> PositionerState:
@@ -211,31 +220,7 @@ class PlanMovable:
     def _source(self) -> str:
         return f"{self._axis.controller}:{self._now.name}"
 
-
-@checked_class
-class AxisMovable(PlanMovable, PlanSignal):
-    """An axis for bluesky's RunEngine, whose documents forbid the dot in a name: "left_x".
-
-    Plans can monitor it, and suspenders watch its position.
-    """
-
-    def __init__(self, axis: PlanAxis) -> None:
-        self._moved = axis
-
-    @override
-    def __repr__(self) -> str:
-        return f"<AxisMovable {self.name}>"
-
-    @property
-    @override
-    def name(self) -> str:
-        """Name of the axis without the dot, such as "left_x"."""
-        return plain_name(self._now.name)
-
-    @property
-    @override
-    def _axis(self) -> PlanAxis:
-        return self._moved
+    # What a plan or a script follows
 
     @override
     def get(self) -> float:
@@ -244,9 +229,27 @@ class AxisMovable(PlanMovable, PlanSignal):
         return math.nan if here is None else here
 
     @override
-    def _on_news(self, listener: Callable[[], object]) -> Unsubscribe:
-        return self._moved.subscribe(lambda _state: listener())
+    def subscribe(
+        self, function: Callable[..., object], event_type: object = None, run: bool = True
+    ) -> Unsubscribe:
+        """Call ``function(state)`` after each change; returns the function that ends it.
 
-    def check(self, position: Number, *, consent: bool = False) -> MoveVerdict:
-        """Return the gate's answer to a move to `position`, without moving."""
-        return self._moved.check(position, consent=consent)
+        It is called in the device's thread and must return at once; a position in motion is read
+        about 20 times a second. A function that takes ``value``, ``timestamp`` and ``obj`` by
+        name, as those of bluesky do, is called with these, and where `run` at once.
+        """
+        if not _takes_values(function):
+            return self._on_state(function)
+        return super().subscribe(function, event_type, run)
+
+    @override
+    def _on_news(self, listener: Callable[[], object]) -> Unsubscribe:
+        return self._on_state(lambda _state: listener())
+
+
+def _takes_values(function: Callable[..., object]) -> bool:
+    try:
+        inspect.signature(function).bind(value=0.0, timestamp=0.0, obj=None)
+    except (TypeError, ValueError):  # what is written in C has no signature
+        return False
+    return True

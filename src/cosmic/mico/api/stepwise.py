@@ -62,7 +62,7 @@ class StepwiseMove:
         cls, axis: Axis, distance: Number, largest: Number, *, consent: bool = False
     ) -> "StepwiseMove":
         """Move by `distance` from where the axis stands."""
-        travel = as_number(distance, axis.unit, axis.name)
+        travel = as_number(distance, axis.unit, axis.key)
         return cls(axis, _position(axis) + travel, largest, consent=consent)
 
     @property
@@ -90,7 +90,7 @@ class StepwiseMove:
         """Begin the next part; the caller's thread at first, then the device's."""
         with self._lock:
             if self._abandoned:
-                self.movement.fail(MoveCancelled(f"{self._axis.name}: the series was given up"))
+                self.movement.fail(MoveCancelled(f"{self._axis.key}: the series was given up"))
                 return
             self._begun += 1
             travel = min(self._begun * self._largest, abs(self._travel))
@@ -116,22 +116,22 @@ class StepwiseMove:
         try:
             self._next()
         except CosmicError as exc:  # the device went away between two parts
-            logger.warning("%s: %s", self._axis.name, exc)
+            logger.warning("%s: %s", self._axis.key, exc)
             self.movement.fail(exc)
 
 
 def _position(axis: Axis) -> float:
     position = axis.details.shown_position
     if position is None:
-        raise NotAvailable(f"{axis.name}: no position has been read yet")
+        raise NotAvailable(f"{axis.key}: no position has been read yet")
     return position
 
 
 def _above_zero(largest: Number, axis: Axis) -> float:
-    value = as_number(largest, axis.unit, axis.name)
+    value = as_number(largest, axis.unit, axis.key)
     if not value > 0.0:
-        text = f"{axis.name}: the largest part of a move must be above 0, not {value:g}"
-        raise refusal(refuse(Reason.LIMIT, text, axis=axis.name, value=value, limit=0.0))
+        text = f"{axis.key}: the largest part of a move must be above 0, not {value:g}"
+        raise refusal(refuse(Reason.LIMIT, text, axis=axis.key, value=value, limit=0.0))
     return value
 
 
@@ -144,5 +144,5 @@ def _travel(axis: Axis, target: Number, *, consent: bool) -> tuple[float, float]
     if not verdict.allowed:
         raise refusal(verdict)
     start = _position(axis)
-    travel = as_number(target, axis.unit, axis.name) - start
+    travel = as_number(target, axis.unit, axis.key) - start
     return start + axis.details.zero, travel

@@ -60,13 +60,13 @@ class AxisRow(QObject):
         self.backward = self._side(settings.backward_text, -1)
         self.forward = self._side(settings.forward_text, 1)
         self.target = named(
-            QuantityField(axis.unit, name=f"Target of {axis.name}, for Go to"), "rowTarget"
+            QuantityField(axis.unit, name=f"Target of {axis.key}, for Go to"), "rowTarget"
         )
-        self.go_to = named(push_button("Go to", f"Move {axis.name} to the target"), "rowGoTo")
+        self.go_to = named(push_button("Go to", f"Move {axis.key} to the target"), "rowGoTo")
         styled(self.go_to, "narrow")
         self.stop = named(QToolButton(), "stopAxis")
         self.stop.setText("■")
-        tipped(self.stop, f"Stop {axis.name}; the other axes go on")
+        tipped(self.stop, f"Stop {axis.key}; the other axes go on")
         self.line = named(ElidedLabel(), "rowLine")
         self.line.set_dim(True)
         for field in (self.step, self.target):
@@ -87,15 +87,15 @@ class AxisRow(QObject):
                 high=LARGEST_STEPS,
                 value=float(defaults.steps),
                 integers=True,
-                name=f"Steps of one click of {axis.name}",
+                name=f"Steps of one click of {axis.key}",
             )
             return named(field, "rowStep")
         usual = defaults.distance_deg if axis.unit == "deg" else defaults.distance_um
-        return named(StepField(axis.unit, value=usual, name=f"Step size of {axis.name}"), "rowStep")
+        return named(StepField(axis.unit, value=usual, name=f"Step size of {axis.key}"), "rowStep")
 
     def _side(self, text: str, direction: int) -> QPushButton:
         button = styled(
-            push_button(text, f"Move {self.card.axis.name} {text} by the step"), "narrow"
+            push_button(text, f"Move {self.card.axis.key} {text} by the step"), "narrow"
         )
         button.setFixedWidth(_SIDE_PX)
         button.clicked.connect(self._on_forward if direction > 0 else self._on_backward)

@@ -94,7 +94,7 @@ class JogKeys(QObject):
                 "it was not renewed in time, as the window was busy; let go and hold the key again"
             )
         if why:
-            logger.info("%s: the jog by the key %s ended: %s", jog.card.axis.name, key, why)
+            logger.info("%s: the jog by the key %s ended: %s", jog.card.axis.key, key, why)
         return f"the jog ended: {why}" if why else ""
 
     def _on_hold_lost(self, key: str, why: str) -> None:

@@ -27,9 +27,9 @@ def show_links(card: ClosedLoopGUI, mico: Mico) -> None:
     """Show on a card what its axis is linked with."""
     axis = card.axis
     others = [
-        each.name
+        each.key
         for each in mico
-        if each.name != axis.name
+        if each.key != axis.key
         and each.kind is axis.kind
         and each.kind is not PositionerKind.OPEN_LOOP
     ]

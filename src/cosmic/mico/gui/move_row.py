@@ -45,13 +45,13 @@ class MoveFields:
         usual = defaults.distance_deg if unit == "deg" else defaults.distance_um
         smallest = 0.001 if unit == "deg" else 0.1
         self.distance = named(
-            StepField(unit, value=usual, name=f"Step size of {axis.name}, for both buttons"),
+            StepField(unit, value=usual, name=f"Step size of {axis.key}, for both buttons"),
             "MiCoCL_8",
         )
-        self.target = named(QuantityField(unit, name=f"Target of {axis.name}, for Go to"), "target")
+        self.target = named(QuantityField(unit, name=f"Target of {axis.key}, for Go to"), "target")
         self._target_set = False
         self.go_to = named(
-            push_button("Go to", f"Move {axis.name} to the position in the field beside"),
+            push_button("Go to", f"Move {axis.key} to the position in the field beside"),
             "MiCoCL_9",
         )
         self.split = named(QCheckBox("in steps of"), "MiCoCL_10")

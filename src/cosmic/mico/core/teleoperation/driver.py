@@ -45,8 +45,8 @@ class SteeredAxis(Protocol):
 
     @property
     @abstractmethod
-    def name(self) -> str:
-        """Name of the axis."""
+    def key(self) -> str:
+        """Name of the axis, such as "left.x"."""
 
     @property
     @abstractmethod
@@ -74,7 +74,7 @@ class AxisDriver:
         commands: RateMeter,
     ) -> None:
         state = axis.details
-        self.name = axis.name
+        self.name = axis.key
         self._axis = axis
         self._settings = settings
         self._source = source
