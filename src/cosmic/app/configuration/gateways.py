@@ -61,6 +61,8 @@ class EpicsSettings(StrictModel):
     write: bool = True
     approve: bool = False
     step_um: float = Field(default=0.5, gt=0.0, allow_inf_nan=False)
+    pva: bool = False
+    pva_port: int = Field(default=0, ge=0, le=65_535)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,9 +4,9 @@ import logging
 from collections.abc import Mapping
 from contextlib import ExitStack
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from cosmic.app.configuration.gateways import Doors
+from cosmic.app.configuration.gateways import Doors, EpicsSettings
 from cosmic.frame.errors import NotAvailable, needs_extra
 from cosmic.frame.network.host import Host
 from cosmic.frame.network.station import Station
@@ -19,6 +19,7 @@ logger = logging.getLogger(__name__)
 _NEEDED: Final = {
     "http": ("HTTP", ("starlette", "uvicorn", "websockets")),
     "epics": ("EPICS", ("caproto",)),
+    "pva": ("Images over PVA", ("p4p",)),
 }
 
 
@@ -57,9 +58,22 @@ class Gateways:
                 epics = EpicsGateway(station, hosts, doors.epics, asked)
                 undo.callback(epics.close)
                 self._lines.append(f"EPICS at {epics.address}")
+                if doors.epics.pva and "vico" in hosts:
+                    self._open_images(station, hosts["vico"], doors.epics, undo)
             self._undo = undo.pop_all()
         for line in self._lines:
             logger.info("%s", line.partition(" (token")[0])
+
+    def _open_images(
+        self, station: Station, vico: Host, settings: EpicsSettings, undo: ExitStack
+    ) -> None:
+        require("pva")
+        from cosmic.app.gateways.epics_pva import PvaImages
+
+        cameras: Any = vico.state(whole=False).values["camera_handles"]
+        images = PvaImages(station, list(cameras), settings)
+        undo.callback(images.close)
+        self._lines.append(f"images over PVA at port {images.port}")
 
     @property
     def lines(self) -> tuple[str, ...]:
