@@ -341,6 +341,7 @@ def _add_procedure_commands(
     campaign.add_argument("--seed", type=int, help="seed of the simulation")
     plate = commands.add_parser("plate", help="confirm the plate that a running campaign asks for")
     plate.add_argument("folder", type=Path, metavar="FOLDER", help="of the campaign")
+    _add_calibrate_force(commands, platform)
     calibrate = commands.add_parser(
         "calibrate",
         help="renew expired calibrations, without a window",
@@ -356,6 +357,31 @@ def _add_procedure_commands(
     calibrate.add_argument(
         "--zooms", action="store_true", help="map every zoom step of the lens as well"
     )
+
+
+def _add_calibrate_force(
+    commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
+    platform: argparse.ArgumentParser,
+) -> None:
+    force = commands.add_parser(
+        "calibrate-force",
+        help="the scale of the force, against known weights or a reference beam on the plate",
+        parents=[platform, _connect_options()],
+    )
+    force.add_argument(
+        "--weights", type=_masses, metavar="MG", help="masses in milligrams, such as 1,2,5"
+    )
+    force.add_argument("--beam", type=float, metavar="EI", help="bending stiffness of a beam, N m2")
+    force.add_argument(
+        "--expanded-percent",
+        type=float,
+        default=2.0,
+        metavar="P",
+        help="expanded uncertainty of the masses or of the beam, k = 2",
+    )
+    force.add_argument("--rounds", type=int, default=None, help="how often all is measured")
+    force.add_argument("--channel", default="force", help="of the weights")
+    force.add_argument("--out", type=Path, metavar="FILE", help="write all readings there, as JSON")
 
 
 def _platform_options() -> argparse.ArgumentParser:
@@ -420,6 +446,13 @@ def _line_options() -> argparse.ArgumentParser:
 
 def _names(text: str) -> tuple[str, ...]:
     return tuple(each.strip() for each in text.split(",") if each.strip())
+
+
+def _masses(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(each) for each in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} are no masses such as 1,2,5") from None
 
 
 def _moment(text: str) -> datetime:

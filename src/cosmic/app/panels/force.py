@@ -27,6 +27,7 @@ from PySide6.QtWidgets import (
 
 from cosmic.app.panels.curve_frame import CurveFrame
 from cosmic.app.panels.force_analysis import LowPass, RecentValues, SpectrumCurve
+from cosmic.app.panels.force_calibration import ForceCalibrationDialog
 from cosmic.daqco.api.daqco import Daqco, DaqLimit
 from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.core.chunk import DataChunk
@@ -291,6 +292,8 @@ class ForcePanel(QWidget):
         menu.addSeparator()
         spectrum = menu.addAction("Spectrum")
         spectrum.triggered.connect(self._on_spectrum)
+        weights = menu.addAction("Calibrate with weights…")
+        weights.triggered.connect(self._on_calibrate)
         filters = menu.addMenu("Filter what is shown")
         self.filters = QActionGroup(filters)
         for cut_hz in (0.0, *FILTERS_HZ):
@@ -508,6 +511,14 @@ class ForcePanel(QWidget):
 
     def _on_limit(self) -> None:
         dialog = LimitDialog(self._daqco, self._channel, self)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.open()
+
+    def _on_calibrate(self) -> None:
+        if self._daqco.remote:
+            self._say("calibrate where the boards are", refused=True)
+            return
+        dialog = ForceCalibrationDialog(self._daqco, self._channel, self)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.open()
 
