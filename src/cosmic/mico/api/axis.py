@@ -38,7 +38,7 @@ from cosmic.mico.api.entry import (
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.news import SentMotion
 from cosmic.mico.api.plan_movable import PlanAxis, PlanMovable
-from cosmic.mico.api.remote_axis_state import RemoteAxisState
+from cosmic.mico.api.remote_axis import RemoteAxisState
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.manager import DeviceManager

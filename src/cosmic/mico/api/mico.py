@@ -35,7 +35,6 @@ from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.companion import MicoCompanion
 from cosmic.mico.api.entry import Number, as_number, finite, one_line, source_of
-from cosmic.mico.api.foresight import foreseen
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.live_clearance import LiveClearance
@@ -50,6 +49,7 @@ from cosmic.mico.api.news import (
 )
 from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.api.poses import Poses
+from cosmic.mico.api.remote_axis import foreseen
 from cosmic.mico.api.tools import Tools
 from cosmic.mico.api.trajectories import Trajectories
 from cosmic.mico.api.trajectory_recording import Recordings

@@ -16,25 +16,55 @@ from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.mico.api.news import AxesStarted, MovementNews
 from cosmic.mico.core.motion.links import Link
 from cosmic.mico.core.settings import GroupSettings, MicoSettings, PositionerSettings
-from cosmic.mico.gui.arrangement import arranged_groups
 from cosmic.mico.gui.axis_commands import ConsentRequest
 from cosmic.mico.gui.axis_table import AxisTable
 from cosmic.mico.gui.caution_dialog import CautionDialog
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI
 from cosmic.mico.gui.collision_status import CollisionStatus
-from cosmic.mico.gui.columns import GroupColumns
+from cosmic.mico.gui.columns import GroupColumns, arranged_groups
 from cosmic.mico.gui.consent_dialog import ConsentDialog
 from cosmic.mico.gui.device_gui import DeviceGUI
 from cosmic.mico.gui.initialisation_panel import make_initialisation_panel
 from cosmic.mico.gui.jog_keys import JogKey, JogKeys
 from cosmic.mico.gui.key_names import key_text
-from cosmic.mico.gui.linking import join_links, show_links
 from cosmic.mico.gui.mico_header import MicoHeader
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 from cosmic.mico.gui.qt_application import qt_application
 from cosmic.mico.gui.registry import gui_class
 from cosmic.mico.gui.state_feed import StateFeed
 from cosmic.mico.gui.undo_gui import UNDO_KEY, UndoGui
+from cosmic.mico.hw.interface import PositionerKind
+
+
+def join_links(card: ClosedLoopGUI, mico: Mico) -> None:
+    """Have the switch of a card link its axis and unlink it."""
+    name = card.settings.name
+
+    def link(other: str, ratio: float) -> None:
+        try:
+            mico.link(name, other, ratio)
+        except CosmicError as exc:
+            card.say_refused(str(exc))
+
+    def unlink() -> None:
+        mico.unlink(name)
+
+    card.link_wanted.connect(link)
+    card.unlink_wanted.connect(unlink)
+
+
+def show_links(card: ClosedLoopGUI, mico: Mico) -> None:
+    """Show on a card what its axis is linked with."""
+    axis = card.axis
+    others = [
+        each.key
+        for each in mico
+        if each.key != axis.key
+        and each.kind is axis.kind
+        and each.kind is not PositionerKind.OPEN_LOOP
+    ]
+    card.show_links(axis.linked_to, others)
+
 
 logger = logging.getLogger(__name__)
 

@@ -1,5 +1,6 @@
 """SmarAct's MCS2 through the library SmarActCTL: requests, events and command groups."""
 
+import ctypes
 import logging
 import threading
 from collections.abc import Callable, Iterable, Sequence
@@ -33,8 +34,23 @@ from cosmic.mico.hw.interface import (
     MatchedMove,
     Serial,
 )
+from cosmic.mico.hw.scu3d_load import SmaractLibrary
 from cosmic.mico.hw.smaractctl_errors import LIBRARY, result_error
-from cosmic.mico.hw.smaractctl_load import load_library
+
+SMARACT_CTL: Final = SmaractLibrary(
+    windows="SmarActCTL.dll",
+    linux="libsmaractctl.so",
+    product="SmarActCTL",
+    sdk="SmarAct MCS2 SDK",
+    proof="SA_CTL_Open",
+    others="SCU and MCS",
+)
+
+
+def load_library(path: str = "") -> ctypes.CDLL:
+    """Load SmarActCTL; see `SmaractLibrary.load`."""
+    return SMARACT_CTL.load(path)
+
 
 logger = logging.getLogger(__name__)
 

@@ -1,6 +1,6 @@
 """The path from one point of some axes to another: what is simplest first, then a search."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -8,12 +8,49 @@ from typing import Final
 from cosmic.mico.core.collision.sweep import Sweep
 from cosmic.mico.core.planning.boxes import Boxes, Effort
 from cosmic.mico.core.planning.detour import detour, lifts, one_by_one
-from cosmic.mico.core.planning.margins import arrival, departure
 from cosmic.mico.core.planning.problem import NoPath, Plan, Problem, Segment, validate
 from cosmic.mico.core.planning.refusals import at_goal, at_start, no_path, too_tight
 from cosmic.mico.core.planning.rrt_connect import MOST_LEGS, search
 from cosmic.mico.core.planning.simplify import legs, shorten
-from cosmic.mico.core.planning.space import Path, Point, Space
+from cosmic.mico.core.planning.space import DIGITS, Path, Point, Space
+
+STEPS_UM: Final = (5.0, 20.0, 100.0, 500.0, 2500.0)
+
+
+def departure(boxes: Boxes, start: Point, goal: Point) -> Point | None:
+    """Return a point free for every axis to which the axes can retreat: the goal, or one near."""
+    inside = boxes.space.clipped(start)
+    for point in (goal, inside, *_around(boxes, inside)):
+        if boxes.effort.spent:
+            return None
+        if point == start or not boxes.free(point):
+            continue
+        if boxes.touch_tight(start, point, leaving=True) is None:
+            return point
+    return None
+
+
+def arrival(boxes: Boxes, goal: Point) -> Point | None:
+    """Return a free point from which one axis can bring everything to the goal."""
+    for point in _around(boxes, goal):
+        if boxes.effort.spent:
+            return None
+        if boxes.free(point) and boxes.touch_tight(point, goal, leaving=False) is None:
+            return point
+    return None
+
+
+def _around(boxes: Boxes, point: Point) -> Iterator[Point]:
+    """Yield points beside one, each off by one axis, the nearest first."""
+    space = boxes.space
+    for step_um in STEPS_UM:
+        for number, weight in enumerate(space.weights):
+            for step in (step_um / weight, -step_um / weight):
+                value = round(point[number] + step, DIGITS)
+                beside = space.clipped((*point[:number], value, *point[number + 1 :]))
+                if beside != point:
+                    yield beside
+
 
 LONG: Final = 1.5
 """A path this many times as long as the straight one is worth a search for a better one."""

@@ -8,11 +8,69 @@ import numpy.typing as npt
 import pyqtgraph.opengl as gl
 from OpenGL import GL
 from pyqtgraph.opengl.items.GLMeshItem import DirtyFlag
+from pyqtgraph.opengl.shaders import FragmentShader, ShaderProgram, VertexShader
 from PySide6.QtGui import QMatrix4x4
 
 from cosmic.mico.core.collision.model import Floats
-from cosmic.mico.gui.scene.gl_shader import light_shader, set_look
 from cosmic.mico.gui.scene.meshes import BodyMesh, Bools
+
+_VERTEX: Final = """
+    uniform mat4 u_mvp;
+    uniform mat3 u_normal;
+    uniform float u_look[5];  // red, green, blue of a tint, its share, opacity of the whole
+    attribute vec4 a_position;
+    attribute vec3 a_normal;
+    attribute vec4 a_color;
+    varying vec4 v_color;
+    #ifdef STRIPES
+    varying vec4 v_own;
+    #endif
+    void main() {
+        float sky = 0.5 + 0.5 * dot(normalize(u_normal * a_normal), vec3(-0.36, 0.74, 0.57));
+        float light = mix(0.34, 1.08, sky * sky * (3.0 - 2.0 * sky));
+        vec3 tint = vec3(u_look[0], u_look[1], u_look[2]);
+        v_color = vec4(light * mix(a_color.rgb, tint, u_look[3]), a_color.a * u_look[4]);
+    #ifdef STRIPES
+        v_own = vec4(light * a_color.rgb, v_color.a);
+    #endif
+        gl_Position = u_mvp * a_position;
+    }
+"""
+
+_FRAGMENT: Final = """
+    #ifdef GL_ES
+    precision mediump float;
+    #endif
+    varying vec4 v_color;
+    #ifdef STRIPES
+    varying vec4 v_own;
+    #endif
+    void main() {
+    #ifdef STRIPES
+        bool own = fract((gl_FragCoord.x + gl_FragCoord.y) / 12.0) < 0.5;
+        gl_FragColor = own ? v_own : v_color;
+    #else
+        gl_FragColor = v_color;
+    #endif
+    }
+"""
+
+
+def light_shader(*, stripes: bool = False) -> Any:
+    """Return a new program, which tints what it draws, or stripes it; one a context."""
+    head = "#define STRIPES\n" if stripes else ""
+    return ShaderProgram(None, [VertexShader(head + _VERTEX), FragmentShader(head + _FRAGMENT)])
+
+
+def set_look(
+    shader: Any,
+    tint: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    share: float = 0.0,
+    opacity: float = 1.0,
+) -> None:
+    """Have what is drawn next with `shader` look so."""
+    shader["u_look"] = (*tint, share, opacity)
+
 
 _BUFFERS: Final = ("m_vbo_position", "m_vbo_normal", "m_vbo_color", "m_ibo_faces")
 _ALL: Final = DirtyFlag.POSITION | DirtyFlag.NORMAL | DirtyFlag.COLOR | DirtyFlag.FACES

@@ -22,11 +22,10 @@ from cosmic.frame.overrides import override
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.gui.scene.arms import Preset
-from cosmic.mico.gui.scene.bodies_menu import BodiesButton
 from cosmic.mico.gui.scene.clearance_line import ClearanceLine, RefusedLine
 from cosmic.mico.gui.scene.content import Path, SceneContent
 from cosmic.mico.gui.scene.gl_context import GLContext
-from cosmic.mico.gui.scene.look_bar import LookBar
+from cosmic.mico.gui.scene.look_bar import BodiesButton, LookBar
 from cosmic.mico.gui.scene.projection_view import ProjectionView
 from cosmic.mico.gui.scene.view import SceneView
 
