@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,9 @@ from contract.cameras.gige_process import GigeCamera, missing
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceError, NotConnectedError
 from cosmic.vico.hw.aravis import AravisLibrary
+from cosmic.vico.hw.aravis_ctypes import AravisCalls
 from cosmic.vico.hw.interface import (
+    PixelFormat,
     Camera,
     CameraSettings,
     Frame,
@@ -104,6 +107,29 @@ def test_another_program_reads_the_settings_from_the_camera(
     assert float(seen["ExposureTimeAbs"]) == pytest.approx(12300.0)
 
 
+def test_colours_are_made_of_the_raw_mosaic_of_a_camera_that_sends_nothing_else(
+    process: GigeCamera, library: AravisLibrary, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = AravisCalls.strings
+
+    def mosaics_only(self: AravisCalls, whom: str, name: str, *arguments: Any) -> Any:
+        found = real(self, whom, name, *arguments)
+        return [each for each in found if each.startswith("Bayer")] if "pixel_f" in name else found
+
+    monkeypatch.setattr(AravisCalls, "strings", mosaics_only)
+    camera = library.open(process.key)
+    try:
+        assert camera.ranges.pixel_formats == (PixelFormat.RGB8,)
+        camera.configure(replace(camera.settings, roi=Roi(64, 32, 640, 480), rate_hz=20.0))
+        camera.start()
+        frames = received(camera, 1.0)
+    finally:
+        camera.close()
+    assert frames[0].status is FrameStatus.COMPLETE
+    assert frames[0].data.shape == (480, 640, 3)
+    assert not frames[0].data.flags.writeable
+
+
 def test_a_trigger_stays_in_force_when_the_rate_changes(camera: Camera) -> None:
     armed = camera.configure(replace(fast(camera, 30.0, ROI), trigger=Trigger.SOFTWARE))
     slower = camera.configure(replace(armed, rate_hz=20.0))
@@ -170,6 +196,7 @@ import json, pathlib, sys
 from dataclasses import replace
 from cosmic.frame.clock import WALL
 from cosmic.vico.hw.aravis import AravisLibrary
+from cosmic.vico.hw.aravis_ctypes import AravisCalls
 from cosmic.vico.hw.interface import Roi
 
 library = AravisLibrary(packet_bytes=8000)

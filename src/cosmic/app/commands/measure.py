@@ -35,13 +35,13 @@ def run(chosen: argparse.Namespace) -> int:
     measured: list[Measurement] = []
     refused: list[str] = []
     for number, file in enumerate(files, start=1):
-        if sys.stderr.isatty():
-            sys.stderr.write(f"\r{number} of {len(files)}: {file.name}\033[K")
+        _progress(f"{number} of {len(files)}: {file.name}")
         try:
             measured += _measured(file, folder, f"{number:04d}-{file.stem}", chosen)
         except CosmicError as exc:
-            refused.append(f"{file.name}: {exc}")
-            sys.stderr.write(f"\ncosmic: {file}: {exc}\n")
+            said = str(exc).removeprefix(f"{file}: ")
+            refused.append(f"{file.name}: {said}")
+            sys.stderr.write(f"\ncosmic: {file}: {said}\n")
     if sys.stderr.isatty():
         sys.stderr.write("\n")
     write_csv(folder / TABLE, measured)
@@ -50,6 +50,13 @@ def run(chosen: argparse.Namespace) -> int:
     write_report(folder / REPORT, measured, refused)
     sys.stdout.write(summary(measured, len(refused)) + f"{folder}\n")
     return 1 if refused else 0
+
+
+def _progress(text: str) -> None:
+    """Show how far it is, where somebody looks."""
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r{text}\033[K")
+        sys.stderr.flush()
 
 
 def found_files(chosen: Sequence[Path]) -> list[Path]:
@@ -133,6 +140,8 @@ def _measured(file: Path, folder: Path, stem: str, chosen: argparse.Namespace) -
         return [_measured_stack(file, folder, stem, chosen)]
     found = []
     for number, page in enumerate(read_images(file, chosen.every), start=1):
+        if number > 1:
+            _progress(page.name)
         one = measure_page(page, chosen.pixel_size_um)
         name = stem if number == 1 else f"{stem}-page-{number}"
         write_overlay(folder / f"{name}-overlay.png", page.pixels, one)

@@ -4,6 +4,7 @@ import logging
 import threading
 from collections.abc import Callable
 from ctypes import byref, c_double, c_int, create_string_buffer
+from dataclasses import replace
 from typing import Any, Final
 
 from typing_extensions import override
@@ -14,7 +15,13 @@ from cosmic.frame.plugins import NoOptions
 from cosmic.vico.hw import aravis_ctypes as arv
 from cosmic.vico.hw.aravis_ctypes import AravisBuffer, AravisCalls, AravisStream
 from cosmic.vico.hw.base_camera import BaseCamera, BaseCameraLibrary, Sensor
-from cosmic.vico.hw.camera_frames import FrameNumbers, FrameTimes, empty_pixels
+from cosmic.vico.hw.camera_frames import (
+    BAYER,
+    FrameNumbers,
+    FrameTimes,
+    empty_pixels,
+    from_bayer,
+)
 from cosmic.vico.hw.gvcp import QUIET_S, GvcpWatch, ask_camera, controlled
 from cosmic.vico.hw.interface import (
     CameraBackend,
@@ -34,8 +41,11 @@ from cosmic.vico.hw.interface import (
 logger = logging.getLogger(__name__)
 
 _US_PER_S: Final = 1e6
-# How cameras of before 2012 call a format.
-_OLDER_NAMES: Final = {"RGB8Packed": PixelFormat.RGB8}
+# How cameras of before 2012 call a format. A raw mosaic is taken where there is nothing else: its colours are made here.
+_OTHER_NAMES: Final = {
+    "RGB8Packed": PixelFormat.RGB8,
+    **dict.fromkeys(BAYER, PixelFormat.RGB8),
+}
 # Aravis keeps an incomplete frame for its last packets, for less than this.
 _INCOMPLETE_AGE_S: Final = 0.5
 _FAKE: Final = b"Fake"
@@ -194,7 +204,14 @@ class AravisCamera(BaseCamera):
 
     def _frame(self, buffer: AravisBuffer) -> Frame:
         settings = self._settings
-        data = buffer.pixels(settings)
+        mosaic = self._features.mosaic_of(settings.pixel_format)
+        if mosaic:
+            raw = buffer.pixels(replace(settings, pixel_format=PixelFormat.MONO8))
+            data = None if raw is None else from_bayer(raw, mosaic)
+            if data is not None:
+                data.flags.writeable = False
+        else:
+            data = buffer.pixels(settings)
         # The most that lies between the beginning of an exposure and its first packet.
         rates = self._ranges.rate_hz
         before_s = settings.exposure_s + (0.0 if rates is None else 1.0 / rates.high)
@@ -339,13 +356,14 @@ class AravisFeatures:
             self._call("arv_camera_set_gain_auto", arv.ARV_AUTO_OFF)
         if self._hardware_line or self._has_software:
             self._call("arv_camera_clear_triggers")
-        if self._format() is None:
+        if self._wire() not in self._formats.values():
             self._set_format(next(iter(self._formats)))
 
     def _pixel_formats(self) -> dict[PixelFormat, str]:
         name = "arv_camera_dup_available_pixel_formats_as_strings"
         found = self._calls.strings(self._whom, name, self._camera)
-        understood = {_understood(each): each for each in found}
+        # The last of several names stays: the format itself, rather than a mosaic.
+        understood = {_understood(each): each for each in sorted(found, key=_directness)}
         formats = {each: understood[each] for each in PixelFormat if each in understood}
         if not formats:
             raise DeviceError(
@@ -400,9 +418,17 @@ class AravisFeatures:
             both.append(set(range(max(1, low), high + 1, step)))
         return tuple(sorted(both[0] & both[1])) or (1,)
 
-    def _format(self) -> PixelFormat | None:
+    def mosaic_of(self, pixel_format: PixelFormat) -> str:
+        """Return the GenICam name of the raw mosaic that a format is made of; empty: of none."""
+        name = self._formats.get(pixel_format, "")
+        return name if name in BAYER else ""
+
+    def _wire(self) -> str:
         answer: bytes = self._get("arv_camera_get_pixel_format_as_string") or b""
-        return _understood(answer.decode())
+        return answer.decode()
+
+    def _format(self) -> PixelFormat | None:
+        return _understood(self._wire())
 
     def _set_format(self, pixel_format: PixelFormat) -> None:
         name = self._formats[pixel_format].encode()
@@ -589,11 +615,16 @@ class AravisLibrary(BaseCameraLibrary[AravisCamera]):
         return (found or b"").decode(errors="replace")
 
 
+def _directness(name: str) -> int:
+    """Return how little is to be done to make one of our formats of what has a GenICam name."""
+    return 0 if name in BAYER else 2 if name in set(PixelFormat) else 1
+
+
 def _understood(name: str) -> PixelFormat | None:
     """Return the format of a GenICam name, None where it is none of ours."""
     if name in set(PixelFormat):
         return PixelFormat(name)
-    return _OLDER_NAMES.get(name)
+    return _OTHER_NAMES.get(name)
 
 
 def _taken(key: str) -> NotConnectedError:

@@ -4,6 +4,7 @@ import ctypes
 import math
 from typing import Final
 
+import cv2
 import numpy as np
 
 from cosmic.vico.hw.interface import CameraSettings, PixelFormat, Pixels
@@ -16,6 +17,20 @@ _PLAUSIBLE_GAP: Final = 1000
 _OLDEST_S: Final = 5.0
 # Two crystals differ by less than this; the smallest delay seen is forgotten as slowly.
 _DRIFT: Final = 2e-4
+
+
+BAYER: Final = {
+    "BayerRG8": cv2.COLOR_BayerRGGB2RGB,
+    "BayerGR8": cv2.COLOR_BayerGRBG2RGB,
+    "BayerGB8": cv2.COLOR_BayerGBRG2RGB,
+    "BayerBG8": cv2.COLOR_BayerBGGR2RGB,
+}
+"""GenICam's names of raw colour mosaics, by the first two pixels of the first row."""
+
+
+def from_bayer(mosaic: Pixels, code: str) -> Pixels:
+    """Return the colours of a raw mosaic, red first, shape (height, width, 3)."""
+    return np.asarray(cv2.cvtColor(mosaic, BAYER[code]), dtype=np.uint8)
 
 
 class FrameNumbers:

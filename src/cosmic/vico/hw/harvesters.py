@@ -23,7 +23,7 @@ from cosmic.frame.errors import (
 )
 from cosmic.frame.plugins import NoOptions
 from cosmic.vico.hw.base_camera import BaseCamera, BaseCameraLibrary, Sensor
-from cosmic.vico.hw.camera_frames import FrameNumbers, empty_pixels
+from cosmic.vico.hw.camera_frames import BAYER, FrameNumbers, empty_pixels, from_bayer
 from cosmic.vico.hw.interface import (
     CameraBackend,
     CameraContext,
@@ -59,7 +59,8 @@ _CODES: Final = {
     PixelFormat.MONO10: ("Mono10",),
     PixelFormat.MONO12: ("Mono12",),
     PixelFormat.MONO16: ("Mono16",),
-    PixelFormat.RGB8: ("RGB8", "RGB8Packed", "BGR8", "BGR8Packed", "RGBa8", "BGRa8"),
+    # A raw mosaic where there is nothing else: its colours are made here.
+    PixelFormat.RGB8: ("RGB8", "RGB8Packed", "BGR8", "BGR8Packed", "RGBa8", "BGRa8", *BAYER),
 }
 # Cameras that choose exposure and gain themselves refuse to be told.
 _PREPARE: Final = (
@@ -614,6 +615,8 @@ def pixels_of(buffer: Any, name: str) -> tuple[Pixels, PixelFormat]:
 def _shaped(component: Any, code: str) -> Pixels:
     height, width = int(component.height), int(component.width)
     flat = np.asarray(component.data)
+    if code in BAYER:
+        return from_bayer(flat[: height * width].reshape(height, width), code)
     if _FORMATS[code] is not PixelFormat.RGB8:
         return flat[: height * width].reshape(height, width).copy()
     layers = 4 if "a8" in code else 3

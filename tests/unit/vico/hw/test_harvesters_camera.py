@@ -165,6 +165,25 @@ def test_a_colour_in_the_wrong_order_is_turned_round(
     assert frame.device_ns is None
 
 
+@pytest.mark.parametrize(
+    ("code", "red_row", "red_column"),
+    [("BayerRG8", 0, 0), ("BayerGR8", 0, 1), ("BayerGB8", 1, 0), ("BayerBG8", 1, 1)],
+)
+def test_colours_are_made_of_a_raw_mosaic(
+    camera: HarvestersCamera, device: FakeGenTL, code: str, red_row: int, red_column: int
+) -> None:
+    mosaic = np.full((480, 640), 40, np.uint8)
+    mosaic[red_row::2, red_column::2] = 200
+    mosaic[1 - red_row :: 2, 1 - red_column :: 2] = 90
+    device.buffers.append(Buffer(0, mosaic, code))
+    camera.start()
+    frame = camera.receive(0.0)
+    assert frame is not None
+    assert frame.pixel_format is PixelFormat.RGB8
+    assert frame.data.shape == (480, 640, 3)
+    assert frame.data[100, 200].tolist() == [200, 40, 90]
+
+
 def test_gaps_in_the_numbers_are_counted_also_where_they_begin_anew(
     camera: HarvestersCamera, device: FakeGenTL
 ) -> None:

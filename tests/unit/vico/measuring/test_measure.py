@@ -14,6 +14,8 @@ import tifffile
 import cosmic
 from cosmic.app.cli import main
 from cosmic.frame.errors import ConfigError, RecordingError
+from cosmic.vico.api import find_fibres
+from cosmic.vico.api.measure import read_images
 from unit.vico.vision.drawn_fibres import arc, drawn_image
 
 IMAGE = drawn_image([arc((60.0, 100.0), 0.2, 300.0, 0.6)], [9.0], shape=(300, 400))
@@ -49,6 +51,45 @@ def test_the_pixel_size_comes_from_the_file(tmp_path: Path) -> None:
         assert found[name].pixel_size_um == pytest.approx(0.64, rel=1e-5), name
     assert found["print"].pixel_size_um is None
     assert cosmic.measure(files["ome"], pixel_size_um=2.0).pixel_size_um == 2.0
+
+
+@pytest.mark.parametrize("compression", [5, 7, 32773, 8])  # LZW, JPEG, PackBits, deflate
+def test_compressed_tiffs_are_read_with_all_their_pages(tmp_path: Path, compression: int) -> None:
+    file = tmp_path / "packed.tif"
+    dots = [cv2.IMWRITE_TIFF_XDPI, 25_400, cv2.IMWRITE_TIFF_YDPI, 25_400]
+    dots += [cv2.IMWRITE_TIFF_ROWSPERSTRIP, 16]  # JPEG needs a multiple of eight
+    how = [cv2.IMWRITE_TIFF_COMPRESSION, compression, *dots, cv2.IMWRITE_TIFF_RESUNIT, 2]
+    assert cv2.imwritemulti(str(file), [IMAGE, IMAGE], how)
+    with tifffile.TiffFile(file) as written:
+        assert int(written.pages[1].compression) == compression
+    pages = list(read_images(file))
+    assert [each.name for each in pages] == ["packed.tif page 1", "packed.tif page 2"]
+    for each in pages:
+        assert each.pixel_size_um == pytest.approx(1.0)
+        (fibre,) = find_fibres(each.pixels)
+        assert fibre.length_px == pytest.approx(300.0, rel=0.003)
+
+
+def test_colours_of_a_compressed_tiff_and_of_print_are_those_of_the_file(tmp_path: Path) -> None:
+    colour = np.full((48, 64, 3), (10, 20, 250), np.uint8)
+    cv2.imwrite(str(tmp_path / "lzw.tif"), colour, [cv2.IMWRITE_TIFF_COMPRESSION, 5])
+    cv2.imwrite(str(tmp_path / "plain.tif"), colour, [cv2.IMWRITE_TIFF_COMPRESSION, 1])
+    inks = np.full((48, 64, 4), (0, 230, 240, 5), np.uint8)
+    tifffile.imwrite(tmp_path / "print.tif", inks, photometric="separated")
+    for name in ("lzw", "plain", "print"):
+        (page,) = read_images(tmp_path / f"{name}.tif")
+        assert page.pixels[5, 5].tolist() == pytest.approx([12, 22, 250], abs=4), name
+
+
+def test_a_compression_that_nothing_here_decodes_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "odd.tif"
+    tifffile.imwrite(file, IMAGE)
+    data = bytearray(file.read_bytes())
+    at = data.index(b"\x03\x01\x03\x00")  # the tag of the compression
+    data[at + 8 : at + 10] = (34712).to_bytes(2, "little")  # JPEG 2000
+    file.write_bytes(data)
+    with pytest.raises(RecordingError, match=r"compressed by .*JPEG"):
+        list(read_images(file))
 
 
 def test_a_folder_is_measured_and_written(

@@ -25,6 +25,11 @@ UM_IN = {"m": 1e6, "cm": 1e4, "mm": 1e3, "µm": 1.0, "μm": 1.0, "um": 1.0, "nm"
 WORDS = {"micron": 1.0, "microns": 1.0, "\\u00B5m": 1.0, "inch": 25_400.0}
 TAG_UM = {2: 25_400.0, 3: 1e4}
 NOT_KNOWN = "not known"
+# What tifffile decodes by itself: none, deflate (three numbers), PackBits.
+PLAIN_COMPRESSIONS = (1, 8, 32946, 32773, 50013)
+# What OpenCV decodes besides: CCITT (three numbers), LZW, JPEG. Of others it makes a blank image.
+DECODED_COMPRESSIONS = (*PLAIN_COMPRESSIONS, 2, 3, 4, 5, 7)
+SEPARATED = 5  # cyan, magenta, yellow, black
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,16 +86,50 @@ def _tiff_pages(path: Path) -> Iterator[FileImage]:
             size, source = _tiff_size_um(file)
             step = _tiff_step_um(file)
             count = len(file.pages)
+            decoded = _decoded(file, path)
             for number in range(count):
-                pixels = file.pages[number].asarray()
-                if pixels.ndim == 3 and pixels.shape[0] in (3, 4) and pixels.shape[2] > 4:
-                    pixels = np.moveaxis(pixels, 0, 2)
-                if pixels.ndim == 3 and pixels.shape[2] in (3, 4):
-                    pixels = pixels[:, :, [2, 1, 0]]
+                pixels = decoded[number] if decoded else _page_pixels(file.pages[number])
                 name = path.name if count == 1 else f"{path.name} page {number + 1}"
                 yield FileImage(name, pixels, size, source, step)
     except (OSError, ValueError, LookupError, struct.error, tifffile.TiffFileError) as exc:
         raise RecordingError(f"{path}: cannot be read ({exc})") from exc
+
+
+def _page_pixels(page: Any) -> npt.NDArray[np.generic]:
+    """Return the pixels of a page, colours in the order blue, green, red."""
+    pixels: npt.NDArray[np.generic] = page.asarray()
+    if pixels.ndim == 3 and pixels.shape[0] in (3, 4) and pixels.shape[2] > 4:
+        pixels = np.moveaxis(pixels, 0, 2)
+    if int(page.photometric) == SEPARATED and pixels.ndim == 3 and pixels.dtype == np.uint8:
+        inks = pixels.astype(np.float32) / 255.0
+        mixed = (1.0 - inks[:, :, :3]) * (1.0 - inks[:, :, 3:4])
+        pixels = np.round(255.0 * mixed).astype(np.uint8)
+    if pixels.ndim == 3 and pixels.shape[2] in (3, 4):
+        pixels = pixels[:, :, [2, 1, 0]]
+    return pixels
+
+
+def _decoded(file: "tifffile.TiffFile", path: Path) -> list[npt.NDArray[np.generic]]:
+    """Return all pages as OpenCV decodes them, where tifffile has no decoder; else none.
+
+    Raises
+    ------
+    RecordingError
+        OpenCV has none either.
+    """
+    unknown = [each for each in file.pages if int(each.compression) not in PLAIN_COMPRESSIONS]
+    if not unknown:
+        return []
+    done, pages = False, []
+    if all(int(each.compression) in DECODED_COMPRESSIONS for each in file.pages):
+        coded = np.frombuffer(path.read_bytes(), np.uint8)
+        done, pages = cv2.imdecodemulti(coded, cv2.IMREAD_UNCHANGED)
+    if not done or len(pages) != len(file.pages):
+        kind = getattr(unknown[0].compression, "name", unknown[0].compression)
+        raise RecordingError(
+            f"{path}: cannot be read: compressed by {kind}; save it without compression"
+        )
+    return list(pages)
 
 
 def _video_images(path: Path, every: int) -> Iterator[FileImage]:
