@@ -18,11 +18,11 @@ from cosmic.frame.errors import DeviceError, NotConnectedError
 from cosmic.vico.hw.aravis import AravisLibrary
 from cosmic.vico.hw.aravis_ctypes import AravisCalls
 from cosmic.vico.hw.interface import (
-    PixelFormat,
     Camera,
     CameraSettings,
     Frame,
     FrameStatus,
+    PixelFormat,
     Pixels,
     Roi,
     Trigger,

@@ -1,4 +1,7 @@
-"""Autofocus: by two images where the blur at this zoom is known, by a sweep otherwise."""
+"""Autofocus: by two images where the blur at this zoom is known, by a sweep otherwise.
+
+What two images find is looked at once more, before it is believed.
+"""
 
 import logging
 import math
@@ -104,6 +107,12 @@ class Autofocus:
         if not (sure and 0.0 <= found.position <= limit):
             logger.info("autofocus: two images are not sure (%s); it sweeps", found)
             return None
+        # Where only dust on the sensor is seen, which is always sharp, both agree in a wrong one.
+        self._lens.seek(LensAxis.FOCUS, max(0, round(found.position - apart))).wait(MOVE_S)
+        there = self._image_at(found.position)
+        if not _edges(there) > max(_edges(one), _edges(other)):
+            logger.info("autofocus: what two images found is not sharper than they are; it sweeps")
+            return None
         return found.position, f"sharpest at {found.position:.4g} ± {found.std:.2g}"
 
     def _view(self) -> View | None:
@@ -137,9 +146,7 @@ class Autofocus:
             image = self._image_at(target, move=target != at)
             at, taken = target, taken + 1
             self._seen[float(round(target))] = image.data
-            # Edges: how much of the image is dark tells little, where few fibres lie on it.
-            measure = sharpness(image.data, None, FocusMeasure.TENENGRAD)
-            search.add(float(round(target)), measure)
+            search.add(float(round(target)), _edges(image))
             self._task.report(min(0.99, taken / whole), f"focus at {round(target)} counts")
         answer = search.answer
         if answer is None:
@@ -173,3 +180,8 @@ class Autofocus:
         self._since_s = image.frame.time_s
         self._taken += 1
         return image
+
+
+def _edges(image: CameraImage) -> float:
+    """Return how sharp the edges are: how much of an image is dark says little of few fibres."""
+    return sharpness(image.data, None, FocusMeasure.TENENGRAD)

@@ -41,7 +41,7 @@ from cosmic.vico.hw.interface import (
 logger = logging.getLogger(__name__)
 
 _US_PER_S: Final = 1e6
-# How cameras of before 2012 call a format. A raw mosaic is taken where there is nothing else: its colours are made here.
+# How cameras of before 2012 call a format. A raw mosaic is taken where there is nothing else.
 _OTHER_NAMES: Final = {
     "RGB8Packed": PixelFormat.RGB8,
     **dict.fromkeys(BAYER, PixelFormat.RGB8),

@@ -536,11 +536,12 @@ class Features:
     def _pixel_format(self) -> PixelFormat:
         now = self._value("PixelFormat")
         for pixel_format, codes in _CODES.items():
-            if now in codes:
+            # A mosaic stays only where its colours are to be had in no other way.
+            if now in codes and (now not in BAYER or now == self._codes.get(pixel_format)):
                 return pixel_format
         if not self._codes:
             return PixelFormat.MONO8
-        # A camera wakes up in a format that CoSMic does not read, such as a Bayer one.
+        # A camera wakes up in a format that CoSMic does not read, or not at first.
         first = next(iter(self._codes))
         self._set("PixelFormat", self._codes[first])
         return first

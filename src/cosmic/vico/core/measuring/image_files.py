@@ -120,16 +120,20 @@ def _decoded(file: "tifffile.TiffFile", path: Path) -> list[npt.NDArray[np.gener
     unknown = [each for each in file.pages if int(each.compression) not in PLAIN_COMPRESSIONS]
     if not unknown:
         return []
-    done, pages = False, []
-    if all(int(each.compression) in DECODED_COMPRESSIONS for each in file.pages):
-        coded = np.frombuffer(path.read_bytes(), np.uint8)
-        done, pages = cv2.imdecodemulti(coded, cv2.IMREAD_UNCHANGED)
-    if not done or len(pages) != len(file.pages):
+    known = all(int(each.compression) in DECODED_COMPRESSIONS for each in file.pages)
+    pages = _by_opencv(path) if known else []
+    if len(pages) != len(file.pages):
         kind = getattr(unknown[0].compression, "name", unknown[0].compression)
         raise RecordingError(
             f"{path}: cannot be read: compressed by {kind}; save it without compression"
         )
-    return list(pages)
+    return pages
+
+
+def _by_opencv(path: Path) -> list[npt.NDArray[np.generic]]:
+    coded = np.frombuffer(path.read_bytes(), np.uint8)
+    done, pages = cv2.imdecodemulti(coded, cv2.IMREAD_UNCHANGED)
+    return [np.asarray(each) for each in pages] if done else []
 
 
 def _video_images(path: Path, every: int) -> Iterator[FileImage]:

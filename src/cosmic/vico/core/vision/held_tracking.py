@@ -7,7 +7,7 @@ it, and one that was hidden is known again by them.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -138,17 +138,20 @@ class HeldFibreTracker:
         corner = np.array([left, top], dtype=np.float64)
         gripper = replace(found, hold_px=(found.hold_px[0] - left, found.hold_px[1] - top))
         self._frames += 1
-        retraced = self._retraced(part, corner, found.hold_px)
-        held, reason = self._chosen([] if retraced is None else [retraced], gripper)
-        if held is None:
+        ways: list[Callable[[], list[_Line]]] = [
+            lambda: self._retraced(part, corner, found.hold_px),
+            lambda: [_line_of(each) for each in find_fibres(part)],
+        ]
+        reason = ""
+        for way in ways[::-1] if self._frames % ANEW_EVERY == 0 else ways:
             try:
-                fibres = find_fibres(part)
+                held, reason = self._chosen(way(), gripper)
             except CosmicError as exc:
-                return self._lost(str(exc))
-            held, reason = self._chosen([_line_of(each) for each in fibres], gripper)
-        if held is None:
-            return self._lost(reason)
-        return self._found(*held, corner=corner, gripper=found)
+                reason = str(exc)
+                continue
+            if held is not None:
+                return self._found(*held, corner=corner, gripper=found)
+        return self._lost(reason)
 
     def _chosen(
         self, lines: Iterable[_Line], gripper: GripperTips
@@ -168,11 +171,11 @@ class HeldFibreTracker:
                 best = (line, shape)
         return best, reason
 
-    def _retraced(self, part: Pixels, corner: Floats, hold: Pair) -> _Line | None:
-        """Return the line of the frame before, measured anew; None where that does not do."""
+    def _retraced(self, part: Pixels, corner: Floats, hold: Pair) -> list[_Line]:
+        """Return the line that was known last, measured anew; empty where that does not do."""
         known = self._known
-        if known is None or self._missed or self._frames % ANEW_EVERY == 0:
-            return None
+        if known is None or self._missed > MOST_AROUND:
+            return []
         strand = Strand(self._expected(known, hold) - corner, 0.5 * (known.width + 0.5))
         scene = Scene(
             part.astype(np.float32),
@@ -183,13 +186,13 @@ class HeldFibreTracker:
         )
         course = refine(scene, strand, Neighbours(None, np.zeros(0)))
         if course is None or not course.good.mean() > LEAST_GOOD:
-            return None
+            return []
         away = np.linalg.norm(course.line[[0, -1]] + corner - np.array(known.tip), axis=1)
         if course.ends[int(np.argmin(away))].kind is not EndKind.FREE:
-            return None
+            return []
         stds = np.array([each.std_px for each in course.ends])
         ends = course.line[[0, -1]]
-        return _Line(course.line, course.width, ends, stds, (), known.lighter)
+        return [_Line(course.line, course.width, ends, stds, (), known.lighter)]
 
     def _expected(self, known: _Known, hold: Pair) -> Floats:
         """Return where the line should be: it goes with its gripper, and its tip on as it did."""
