@@ -1,10 +1,8 @@
-"""What DAQCo relies on in any `Board`: simulated, NI's and LabJack's over fake drivers."""
+"""Our boards under the suite that other packages import, and what else these makes do."""
 
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from math import inf, nan
+from collections.abc import Callable, Iterator
 
-import numpy as np
 import pytest
 
 from contract.board_rig import (
@@ -18,16 +16,44 @@ from contract.board_rig import (
     some_inputs,
 )
 from cosmic.daqco.hw.board_checks import negative_input
-from cosmic.daqco.hw.interface import BoardChunk, InputMode, InputSettings
+from cosmic.daqco.hw.interface import BoardLibrary, InputMode
 from cosmic.frame.errors import (
     CosmicError,
     DeviceError,
     DeviceFault,
-    LimitError,
     NotConnectedError,
 )
+from cosmic.testing.boards import BoardContract
 
 DIFFERENTIAL = InputMode.DIFFERENTIAL
+
+
+class _Suite(BoardContract):
+    made: Callable[[], BoardRig]
+
+    @pytest.fixture(autouse=True)
+    def nothing_is_left(self) -> Iterator[None]:
+        self._rigs: list[BoardRig] = []
+        yield
+        for each in self._rigs:
+            each.close()
+
+    def make_library(self) -> tuple[BoardLibrary, Callable[[float], None]]:
+        rig = type(self).made()
+        self._rigs.append(rig)
+        return rig.library, lambda seconds: rig.go_on(round(seconds * 1000.0))
+
+
+class TestSimulatedBoards(_Suite):
+    made = SimulatedRig
+
+
+class TestBoardsOfNationalInstruments(_Suite):
+    made = NidaqmxRig
+
+
+class TestBoardsOfLabJack(_Suite):
+    made = LabjackRig
 
 
 @pytest.fixture(params=[SimulatedRig, NidaqmxRig, LabjackRig])
@@ -54,11 +80,6 @@ def test_the_library_lists_its_boards_with_what_they_can(rig: BoardRig) -> None:
     assert len({each.serial for each in boards}) == 2
     assert rig.open().info == board
     assert rig.library.name
-
-
-def test_a_board_that_is_not_there_is_named_with_those_that_are(rig: BoardRig) -> None:
-    with pytest.raises(NotConnectedError, match=rf"'Dev7'.*{rig.one}, {rig.other}"):
-        rig.library.open("Dev7")
 
 
 def test_a_missing_driver_is_named(rig: BoardRig) -> None:
@@ -92,16 +113,6 @@ def test_the_rate_that_is_reported_is_near_the_one_asked(rig: BoardRig) -> None:
     assert made_hz == pytest.approx(asked_hz, rel=1e-3)
 
 
-@pytest.mark.parametrize("count", [1, 2, 0])
-def test_a_chunk_has_a_row_for_each_input_even_for_one(rig: BoardRig, count: int) -> None:
-    count = count or rig.count
-    board = rig.running(inputs=count)
-    rig.go_on(10)
-    volts = received(board, 1)[0].volts
-    assert volts.shape == (count, 10)
-    assert volts.dtype == np.float64
-
-
 def test_rows_stand_in_the_order_configured(rig: BoardRig) -> None:
     board = rig.open()
     numbers = (7, 0, rig.count - 1, 3)
@@ -110,18 +121,6 @@ def test_rows_stand_in_the_order_configured(rig: BoardRig) -> None:
     rig.go_on(10)
     levels_v = received(board, 1)[0].volts.mean(axis=1)
     assert levels_v == pytest.approx([0.1 * number for number in numbers], abs=5e-3)
-
-
-def test_each_chunk_is_a_fresh_array_of_the_receiver(rig: BoardRig) -> None:
-    board = rig.running()
-    rig.go_on(20)
-    one, other = received(board, 2)
-    assert one.volts.flags.writeable and other.volts.flags.c_contiguous
-    assert not np.shares_memory(one.volts, other.volts)
-    one.volts[:] = 99.0
-    one.volts.flags.writeable = False
-    rig.go_on(10)
-    assert received(board, 1)[0].volts.max() < 1.0
 
 
 def test_several_boards_acquire_at_once(rig: BoardRig) -> None:
@@ -148,83 +147,6 @@ def test_two_boards_together_carry_many_channels_near_their_highest_rate(rig: Bo
 # --- order of calls ---------------------------------------------------------------------------
 
 
-def test_receiving_in_vain_gives_none_after_the_time_given(rig: BoardRig) -> None:
-    board = rig.running()
-    assert board.receive(0.0) is None
-    assert board.receive(0.01) is None
-
-
-def test_a_board_that_is_not_started_gives_nothing(rig: BoardRig) -> None:
-    board = rig.open()
-    assert board.receive(0.0) is None
-    board.configure(some_inputs(1), 1000.0, 10)
-    rig.go_on(20)
-    assert board.receive(0.0) is None
-
-
-def test_starting_needs_a_configuration(rig: BoardRig) -> None:
-    with pytest.raises(DeviceError, match=rf"{rig.one}.*configured") as caught:
-        rig.open().start()
-    assert caught.value.fault is DeviceFault.STATE
-
-
-def test_a_running_board_is_neither_configured_nor_started(rig: BoardRig) -> None:
-    board = rig.running()
-    for attempt in (board.start, lambda: board.configure(some_inputs(1), 100.0, 10)):
-        with pytest.raises(DeviceError, match=rf"{rig.one}.*acquiring") as caught:
-            attempt()
-        assert caught.value.fault is DeviceFault.STATE
-    rig.go_on(10)
-    assert received(board, 1)[0].volts.shape == (4, 10)
-
-
-def test_after_a_stop_nothing_comes_and_a_start_begins_at_zero(rig: BoardRig) -> None:
-    board = rig.running()
-    rig.go_on(30)
-    received(board, 1)
-    board.stop()
-    board.stop()
-    assert board.receive(0.0) is None
-    board.start()
-    rig.go_on(10)
-    assert [each.first_sample for each in received(board, 1)] == [0]
-    assert board.receive(0.0) is None
-
-
-def test_a_board_can_be_configured_anew_between_runs(rig: BoardRig) -> None:
-    board = rig.running(inputs=4)
-    board.stop()
-    board.configure(some_inputs(9), 1000.0, 5)
-    board.configure(some_inputs(2), 1000.0, 5)
-    board.start()
-    rig.go_on(5)
-    assert received(board, 1)[0].volts.shape == (2, 5)
-
-
-def test_a_stop_wakes_whoever_waits(rig: BoardRig) -> None:
-    board = rig.running()
-    got: list[BoardChunk | None] = []
-    waiting = threading.Thread(target=lambda: got.append(board.receive(30.0)))
-    waiting.start()
-    board.stop()
-    waiting.join(10.0)
-    assert got == [None]
-
-
-def test_a_closed_board_stays_closed_and_another_can_be_opened(rig: BoardRig) -> None:
-    board = rig.running()
-    board.close()
-    board.close()
-    board.stop()
-    assert board.receive(0.0) is None
-    for attempt in (board.start, lambda: board.configure(some_inputs(1), 100.0, 10)):
-        with pytest.raises(DeviceError, match=rf"{rig.one}.*closed"):
-            attempt()
-    again = rig.running()
-    rig.go_on(10)
-    received(again, 1)
-
-
 def test_starting_and_stopping_a_hundred_times_leaves_nothing_behind(rig: BoardRig) -> None:
     board = rig.running()
     threads = threading.active_count()
@@ -237,51 +159,6 @@ def test_starting_and_stopping_a_hundred_times_leaves_nothing_behind(rig: BoardR
 
 
 # --- what is refused --------------------------------------------------------------------------
-
-
-def too_many(rig: BoardRig) -> tuple[Sequence[InputSettings], float]:
-    return some_inputs(rig.count), rig.sum_hz / rig.count + 1.0
-
-
-TOO_MUCH: list[tuple[Sequence[InputSettings], float]] = [
-    (some_inputs(12), 250_000.0 / 12 + 1.0),
-    (some_inputs(1), 250_001.0),
-    (some_inputs(1), 0.0),
-    (some_inputs(1), -1000.0),
-    (some_inputs(1), nan),
-    (some_inputs(1), inf),
-    ([], 1000.0),
-    ([one_input(low_v=-10.5)], 1000.0),
-    ([one_input(high_v=11.0)], 1000.0),
-    ([one_input(low_v=1.0, high_v=1.0)], 1000.0),
-    ([one_input(low_v=2.0, high_v=1.0)], 1000.0),
-    ([one_input(low_v=nan)], 1000.0),
-    ([one_input(high_v=inf)], 1000.0),
-]
-
-
-@pytest.mark.parametrize(("inputs", "rate_hz"), [(None, 0.0), *TOO_MUCH])
-def test_what_is_beyond_the_board_is_refused_and_it_stays_usable(
-    rig: BoardRig, inputs: Sequence[InputSettings] | None, rate_hz: float
-) -> None:
-    board = rig.open()
-    if inputs is None:
-        inputs, rate_hz = too_many(rig)
-    with pytest.raises(LimitError, match=rig.one):
-        board.configure(inputs, rate_hz, 10)
-    board.configure(some_inputs(1), 1000.0, 10)
-    board.start()
-    rig.go_on(10)
-    received(board, 1)
-
-
-def test_what_was_configured_before_a_refusal_is_not_started_in_its_place(rig: BoardRig) -> None:
-    board = rig.running()
-    board.stop()
-    with pytest.raises(LimitError):
-        board.configure(*too_many(rig), 10)
-    with pytest.raises(DeviceError, match="configured"):
-        board.start()
 
 
 def test_what_cannot_be_wired_is_refused(rig: BoardRig) -> None:
@@ -300,11 +177,6 @@ def test_what_cannot_be_wired_is_refused(rig: BoardRig) -> None:
         with pytest.raises(DeviceError, match=rf"{rig.one}.*ai|{rig.one}.*port0") as caught:
             rig.open().configure(inputs, 1000.0, 10)
         assert caught.value.fault is fault, inputs
-
-
-def test_a_chunk_without_samples_is_refused(rig: BoardRig) -> None:
-    with pytest.raises(DeviceError, match=f"{rig.one}.*0 samples"):
-        rig.open().configure(some_inputs(1), 1000.0, 0)
 
 
 def test_half_of_the_inputs_can_be_differential(rig: BoardRig) -> None:

@@ -1,4 +1,4 @@
-"""What DAQCo relies on in the outputs of any board: simulated, NI's and LabJack's."""
+"""Outputs, simulated, NI's and LabJack's, under the suite for all, and what else they do."""
 
 import inspect
 from abc import ABC, abstractmethod
@@ -27,13 +27,10 @@ from cosmic.daqco.hw.outputs import AnalogOutput, Waveform, open_outputs
 from cosmic.daqco.hw.sim_library import SimulatedLibrary
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import (
-    CosmicError,
-    DeviceError,
-    DeviceFault,
-    LimitError,
     NotAvailable,
     NotConnectedError,
 )
+from cosmic.testing.outputs import OutputBench, OutputsContract
 
 PIEZO = AnalogOutput("ao0", 0.0, 5.0)
 OTHER = AnalogOutput("ao1", 0.0, 5.0)
@@ -155,6 +152,34 @@ class LabjackOutputRig(OutputRig):
 RIGS = [SimulatedOutputRig, NidaqmxOutputRig, LabjackOutputRig]
 
 
+class _Suite(OutputsContract):
+    kind: type[OutputRig]
+
+    @pytest.fixture(autouse=True)
+    def nothing_is_left(self) -> Iterator[None]:
+        self._rigs: list[OutputRig] = []
+        yield
+        for each in self._rigs:
+            each.check_left()
+
+    def make_bench(self) -> OutputBench:
+        rig = self.kind()
+        self._rigs.append(rig)
+        return OutputBench(rig.library, rig.board, rig.volts, rig.is_high, rig.go_on)
+
+
+class TestSimulatedOutputs(_Suite):
+    kind = SimulatedOutputRig
+
+
+class TestOutputsOfNationalInstruments(_Suite):
+    kind = NidaqmxOutputRig
+
+
+class TestOutputsOfLabJack(_Suite):
+    kind = LabjackOutputRig
+
+
 @pytest.fixture(params=RIGS)
 def rig(request: pytest.FixtureRequest) -> Iterator[OutputRig]:
     made: OutputRig = request.param()
@@ -169,56 +194,6 @@ def player(request: pytest.FixtureRequest) -> Iterator[OutputRig]:
     made.check_left()
 
 
-def test_the_outputs_are_listed_with_what_they_can(rig: OutputRig) -> None:
-    outputs = open_outputs(rig.library, rig.board)
-    info = outputs.info
-    assert info.board == rig.board
-    assert info.analog == ("ao0", "ao1")
-    assert "port0/line3" in info.lines
-    assert info.low_v <= 0.0 < 5.0 <= info.high_v
-    assert (info.max_rate_hz > 0.0) is rig.plays
-    outputs.close()
-    outputs.close()
-
-
-def test_a_value_is_given_and_stays_when_the_board_is_given_back(rig: OutputRig) -> None:
-    outputs = open_outputs(rig.library, rig.board)
-    outputs.write(PIEZO, 2.5)
-    assert (rig.volts("ao0"), rig.volts("ao1")) == (2.5, 0.0)
-    outputs.close()
-    assert rig.volts("ao0") == 2.5
-
-
-def test_a_line_is_set_and_cleared(rig: OutputRig) -> None:
-    outputs = open_outputs(rig.library, rig.board)
-    outputs.write_line("port0/line3", high=True)
-    assert rig.is_high("port0/line3") and not rig.is_high("port0/line4")
-    outputs.write_line("port0/line3", high=False)
-    assert not rig.is_high("port0/line3")
-    outputs.close()
-
-
-def test_what_the_board_cannot_give_is_refused_and_not_clipped(rig: OutputRig) -> None:
-    outputs = open_outputs(rig.library, rig.board)
-    beyond = outputs.info.high_v + 0.5
-    with pytest.raises(CosmicError, match=rig.board):
-        outputs.write(AnalogOutput("ao0", 0.0, outputs.info.high_v), beyond)
-    assert rig.volts("ao0") == 0.0
-    outputs.close()
-
-
-def test_an_output_that_is_not_there_is_named_with_those_that_are(rig: OutputRig) -> None:
-    outputs = open_outputs(rig.library, rig.board)
-    for attempt in (
-        lambda: outputs.write(AnalogOutput("ao7", 0.0, 1.0), 0.5),
-        lambda: outputs.write_line("port0/line99", high=True),
-    ):
-        with pytest.raises(DeviceError, match=r"there is no output .*ao0, ao1") as caught:
-            attempt()
-        assert caught.value.fault is DeviceFault.NO_CHANNEL
-    outputs.close()
-
-
 def test_a_lost_board_is_reported(rig: OutputRig) -> None:
     outputs = open_outputs(rig.library, rig.board)
     rig.unplug()
@@ -229,46 +204,7 @@ def test_a_lost_board_is_reported(rig: OutputRig) -> None:
     outputs.close()
 
 
-def test_outputs_work_while_the_board_acquires(rig: OutputRig) -> None:
-    board, outputs = rig.library.open(rig.board), open_outputs(rig.library, rig.board)
-    from contract.board_rig import some_inputs
-
-    board.configure(some_inputs(2), 1000.0, 10)
-    board.start()
-    outputs.write(PIEZO, 1.5)
-    assert rig.volts("ao0") == 1.5
-    board.close()
-    outputs.write(PIEZO, 1.0)
-    outputs.close()
-    assert rig.volts("ao0") == 1.0
-
-
 # --- waveforms --------------------------------------------------------------------------------
-
-
-def test_a_waveform_is_given_once_and_its_last_value_stays(player: OutputRig) -> None:
-    outputs = open_outputs(player.library, player.board)
-    made_hz = outputs.play(PIEZO, Waveform(np.array([1.0, 2.0, 3.0]), 1000.0))
-    assert made_hz == pytest.approx(1000.0, rel=1e-3)
-    assert outputs.playing == "ao0"
-    player.go_on(0.01)
-    assert outputs.playing == ""
-    assert player.volts("ao0") == 3.0
-    outputs.close()
-
-
-def test_a_waveform_that_is_repeated_goes_on_until_another_value_is_given(
-    player: OutputRig,
-) -> None:
-    outputs = open_outputs(player.library, player.board)
-    outputs.play(PIEZO, Waveform(np.array([1.0, 2.0]), 1000.0, repeat=True))
-    player.go_on(1.0)
-    assert outputs.playing == "ao0"
-    outputs.write(PIEZO, 0.5)
-    assert outputs.playing == ""
-    player.go_on(1.0)
-    assert player.volts("ao0") == 0.5
-    outputs.close()
 
 
 def test_a_waveform_waits_for_its_trigger(player: OutputRig) -> None:
@@ -290,22 +226,6 @@ def test_one_waveform_a_board_is_played_at_a_time(player: OutputRig) -> None:
     outputs.end_waveform()
     assert outputs.playing == ""
     outputs.play(OTHER, Waveform(np.ones(10), 1000.0))
-    outputs.close()
-
-
-def test_a_rate_that_the_board_does_not_make_is_refused(player: OutputRig) -> None:
-    outputs = open_outputs(player.library, player.board)
-    with pytest.raises(LimitError, match=player.board):
-        outputs.play(PIEZO, Waveform(np.ones(10), 1e9))
-    assert outputs.playing == ""
-    outputs.close()
-
-
-def test_a_labjack_says_that_it_plays_no_waveforms() -> None:
-    rig = LabjackOutputRig()
-    outputs = open_outputs(rig.library, rig.board)
-    with pytest.raises(NotAvailable, match="LabJack"):
-        outputs.play(PIEZO, Waveform(np.ones(10), 1000.0))
     outputs.close()
 
 

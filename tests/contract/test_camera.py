@@ -1,4 +1,4 @@
-"""What ViCo relies on in any `Camera`; see contract.cameras for the cameras under test."""
+"""Our cameras, which `contract.cameras` lists, under the suite for all, and what else they do."""
 
 import importlib
 import threading
@@ -16,11 +16,12 @@ from cosmic.frame.errors import (
     DeviceError,
     DeviceFault,
     NotAvailable,
-    NotConnectedError,
 )
+from cosmic.testing.cameras import CameraContract
 from cosmic.vico.hw.interface import (
     Camera,
     CameraCounters,
+    CameraLibrary,
     CameraSettings,
     Frame,
     FrameStatus,
@@ -81,18 +82,27 @@ def taken(rig: CameraRig, camera: Camera, count: int) -> list[Frame]:
     return frames
 
 
+class TestEveryCamera(CameraContract):
+    """The suite that other packages import, for each of ours."""
+
+    @pytest.fixture(autouse=True)
+    def of(self, rig: CameraRig) -> None:
+        self._rig = rig
+
+    def key(self, library: CameraLibrary) -> str:
+        return self._rig.key
+
+    @pytest.fixture
+    def library(self, rig: CameraRig) -> CameraLibrary:
+        return rig.library
+
+    @pytest.fixture
+    def camera(self, rig: CameraRig) -> Iterator[Camera]:
+        with rig.opened() as opened:
+            yield opened
+
+
 # --- which cameras there are ------------------------------------------------------------------
-
-
-def test_the_library_lists_its_camera_and_says_its_own_name(rig: CameraRig) -> None:
-    listed = {info.key: info for info in rig.library.cameras()}
-    assert rig.key in listed
-    assert rig.library.name
-    with rig.opened() as camera:
-        assert camera.info.key == rig.key
-        assert camera.info.model == listed[rig.key].model
-        assert camera.info.serial == listed[rig.key].serial
-        assert min(camera.info.sensor_px) > 0
 
 
 def test_listing_goes_on_while_a_camera_takes_images(rig: CameraRig, camera: Camera) -> None:
@@ -100,13 +110,6 @@ def test_listing_goes_on_while_a_camera_takes_images(rig: CameraRig, camera: Cam
     taken(rig, camera, 1)
     assert rig.key in [info.key for info in rig.library.cameras()]
     taken(rig, camera, 1)
-
-
-def test_a_camera_that_is_not_there_is_named_with_those_that_are(rig: CameraRig) -> None:
-    with pytest.raises(NotConnectedError) as caught:
-        rig.library.open("no such camera")
-    assert "no such camera" in str(caught.value)
-    assert rig.key in str(caught.value)
 
 
 # --- frames -----------------------------------------------------------------------------------
@@ -182,15 +185,6 @@ def test_a_frame_that_had_to_wait_is_not_said_to_be_newer_than_it_is(
     assert late.exposed_s <= last.time_s + steps * 1.1 / rig.rate_hz
 
 
-def test_nothing_comes_before_the_start_or_after_the_stop(rig: CameraRig, camera: Camera) -> None:
-    assert camera.receive(0.0) is None
-    camera.start()
-    taken(rig, camera, 1)
-    camera.stop()
-    assert camera.receive(0.0) is None
-    camera.stop()
-
-
 def test_a_new_start_counts_anew(rig: CameraRig, camera: Camera) -> None:
     camera.start()
     first = taken(rig, camera, 10)[0].frame_id
@@ -261,20 +255,6 @@ def test_a_stop_wakes_whoever_waits(rig: CameraRig, camera: Camera) -> None:
     assert got[-1] is None
 
 
-def test_a_closed_camera_stays_closed_and_can_be_opened_again(rig: CameraRig) -> None:
-    with rig.opened() as camera:
-        camera.start()
-        camera.close()
-        camera.close()
-        camera.stop()
-        for attempt in (camera.start, lambda: camera.configure(camera.settings)):
-            with pytest.raises(DeviceError):
-                attempt()
-    with rig.opened() as again:
-        again.start()
-        taken(rig, again, 1)
-
-
 @on([each for each in RIGS if each.two])
 def test_two_cameras_run_at_once(rig: CameraRig, camera: Camera) -> None:
     with rig.opened(rig.other_key) as other:
@@ -303,11 +283,6 @@ def test_a_camera_says_what_it_can_and_what_it_cannot(rig: CameraRig, camera: Ca
     assert settings.trigger in ranges.triggers
     assert ranges.width_px.low <= settings.roi.width_px <= ranges.width_px.high
     assert ranges.height_px.low <= settings.roi.height_px <= ranges.height_px.high
-
-
-def test_settings_in_force_are_always_accepted_again(rig: CameraRig, camera: Camera) -> None:
-    before = camera.settings
-    assert camera.configure(before) == before == camera.settings
 
 
 def between(allowed: Range | None) -> float:

@@ -1,19 +1,14 @@
-"""What every lens does: both generations, over an object in this process and over pyserial."""
+"""Both generations of lens under the suite for all, over an object and over pyserial; and more."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
 import pytest
 
 from contract.peripheral_rig import PeripheralRig, terminal
-from cosmic.frame.errors import (
-    ConfigError,
-    DeviceError,
-    DeviceFault,
-    DeviceTimeout,
-    NotAvailable,
-)
+from cosmic.frame.errors import DeviceTimeout, NotAvailable
+from cosmic.testing.lenses import LensContract
 from cosmic.vico.hw.factory import make_lens
 from cosmic.vico.hw.peripherals import Lens, LensAxis
 
@@ -57,6 +52,32 @@ class Bench:
             taken_s += 0.25
             assert taken_s < 30.0
         return taken_s
+
+
+class _Navitar(LensContract):
+    kind: tuple[int, str]
+
+    @pytest.fixture(autouse=True)
+    def benches(self) -> Iterator[None]:
+        with ExitStack() as self._benches:
+            yield
+
+    def make_lens(self) -> tuple[Lens, Callable[[float], None]]:
+        bench = Bench(self.kind, cold=True)
+        self._benches.callback(bench.close)
+        return bench.lens, bench.rig.clock.advance
+
+
+class TestFirstGeneration(_Navitar):
+    kind = (1, "object")
+
+
+class TestFirstGenerationOverATerminal(_Navitar):
+    kind = (1, "terminal")
+
+
+class TestSecondGeneration(_Navitar):
+    kind = (2, "object")
 
 
 @pytest.fixture(params=KINDS)
@@ -135,15 +156,6 @@ def test_homing_makes_counts_true(cold_bench: Bench) -> None:
         assert bench.true_counts(axis) == pytest.approx(2500, abs=1)
 
 
-def test_an_aborted_homing_is_none(cold_bench: Bench) -> None:
-    cold_bench.lens.home(FOCUS)
-    cold_bench.rig.clock.advance(0.5)
-    assert cold_bench.lens.state(FOCUS).moving
-    cold_bench.lens.abort()
-    cold_bench.run(FOCUS)
-    assert not cold_bench.lens.state(FOCUS).homed
-
-
 def test_abort_stops_both_on_the_way(bench: Bench) -> None:
     bench.lens.seek(ZOOM, 12000)
     bench.lens.seek(FOCUS, 8000)
@@ -155,13 +167,6 @@ def test_abort_stops_both_on_the_way(bench: Bench) -> None:
     assert 0 < zoom.position_counts < 12000 and zoom.homed
     assert 4000 < focus.position_counts < 8000 and focus.homed
     assert bench.true_counts(ZOOM) == pytest.approx(zoom.position_counts, abs=1)
-
-
-def test_a_target_off_the_travel_is_refused_with_its_ends(bench: Bench) -> None:
-    for target in (-1, 12001, 2**31):
-        with pytest.raises(ConfigError, match="0 to 12000"):
-            bench.lens.seek(ZOOM, target)
-    assert not bench.lens.state(ZOOM).moving
 
 
 def test_it_works_through_garbage_and_lost_bytes(bench: Bench) -> None:
@@ -196,14 +201,6 @@ def test_lost_steps_are_not_noticed_until_it_is_homed_anew(bench: Bench) -> None
     bench.lens.seek(ZOOM, 10000)
     bench.run(ZOOM)
     assert bench.true_counts(ZOOM) == pytest.approx(10000, abs=1)
-
-
-def test_closing_twice_is_harmless_and_afterwards_it_is_closed(bench: Bench) -> None:
-    bench.lens.close()
-    bench.lens.close()
-    with pytest.raises(DeviceError) as caught:
-        bench.lens.state(ZOOM)
-    assert caught.value.fault == DeviceFault.STATE
 
 
 def test_the_second_generation_over_a_terminal_homes_seeks_and_stops() -> None:

@@ -30,7 +30,13 @@ def installed(package: Path, folder: Path) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
-@pytest.mark.parametrize("kind", KINDS)
+SLOW = ("light", "input", "positioner", "application", "contact")
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(each, marks=[pytest.mark.slow] if each in SLOW else []) for each in KINDS],
+)
 def test_a_new_package_passes_its_tests_at_once(
     kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

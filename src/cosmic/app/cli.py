@@ -23,9 +23,14 @@ DEVICE_KINDS: Final = (
     "board",
     "camera",
     "lens",
+    "light",
+    "input",
+    "positioner",
     "procedure",
     "analysis",
     "exporter",
+    "application",
+    "contact",
 )
 """What `cosmic new-device` writes packages for."""
 _CONFIG: Final = "a platform.toml or its folder"

@@ -13,7 +13,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -96,8 +96,9 @@ class BoardContract:
         steps_s = np.diff([each.time_s for each in chunks])
         assert steps_s == pytest.approx([10 / RATE_HZ] * 3, rel=1e-6)
 
-    @pytest.mark.parametrize("count", [1, 2])
-    def test_a_chunk_has_a_row_for_each_input(self, it: OpenBoard, count: int) -> None:
+    @pytest.mark.parametrize("count", [1, 2, None])
+    def test_a_chunk_has_a_row_for_each_input(self, it: OpenBoard, count: int | None) -> None:
+        count = count or len(it.board.info.inputs)
         it.begin(count)
         it.samples(20)
         volts = it.received(1)[0].volts
@@ -111,6 +112,16 @@ class BoardContract:
         assert one.volts.flags.c_contiguous
         assert one.volts.flags.writeable
         assert not np.shares_memory(one.volts, other.volts)
+        low_v, high_v = it.board.info.ranges_v[0]
+        one.volts[:] = 10.0 * high_v
+        one.volts.flags.writeable = False
+        it.samples(10)
+        assert np.all(np.abs(it.received(1)[0].volts) <= max(-low_v, high_v))
+
+    def test_receiving_in_vain_gives_none_after_the_time_given(self, it: OpenBoard) -> None:
+        it.begin(chunk=1000)
+        assert it.board.receive(0.0) is None
+        assert it.board.receive(0.01) is None
 
     def test_what_is_not_started_gives_nothing(self, it: OpenBoard) -> None:
         assert it.board.receive(0.0) is None
@@ -141,6 +152,15 @@ class BoardContract:
         it.samples(20)
         assert it.received(1)[0].first_sample == 0
 
+    def test_it_can_be_configured_anew_between_runs(self, it: OpenBoard) -> None:
+        it.begin(2)
+        it.board.stop()
+        it.board.configure(it.inputs(2), RATE_HZ, 5)
+        it.board.configure(it.inputs(1), RATE_HZ, 5)
+        it.board.start()
+        it.samples(10)
+        assert it.received(1)[0].volts.shape == (1, 5)
+
     def test_a_stop_wakes_whoever_waits(self, it: OpenBoard) -> None:
         it.begin(chunk=10)
         for _ in range(3):
@@ -151,18 +171,39 @@ class BoardContract:
             waiting.result(_JOIN_S)  # it has ended, with or without a last chunk
 
     def test_what_is_beyond_the_board_is_refused_and_it_stays_usable(self, it: OpenBoard) -> None:
-        info = it.board.info
-        for rate_hz in (2.0 * info.max_single_rate_hz, 0.0, -1.0, math.nan, math.inf):
-            with pytest.raises(LimitError):
-                it.board.configure(it.inputs(1), rate_hz, 10)
-        with pytest.raises(LimitError):
-            it.board.configure([], RATE_HZ, 10)
-        wide = InputSettings(info.inputs[0], info.modes[0], -1000.0, 1000.0)
-        with pytest.raises(LimitError):
-            it.board.configure([wide], RATE_HZ, 10)
+        info, (first,) = it.board.info, it.inputs(1)
+        every = it.inputs(len(info.inputs))
+        wrong = [(it.inputs(1), rate_hz) for rate_hz in (0.0, -1.0, math.nan, math.inf)]
+        wrong += [(it.inputs(1), 2.0 * info.max_single_rate_hz), ([], RATE_HZ)]
+        wrong += [(every, 1.001 * info.highest_rate_hz(len(every)))]
+        for low_v, high_v in (
+            (-1000.0, 1000.0),
+            (first.high_v, first.high_v),
+            (first.high_v, first.low_v),
+            (math.nan, first.high_v),
+            (first.low_v, math.inf),
+        ):
+            wrong += [([replace(first, low_v=low_v, high_v=high_v)], RATE_HZ)]
+        for inputs, rate_hz in wrong:
+            with pytest.raises(LimitError, match=info.name):
+                it.board.configure(inputs, rate_hz, 10)
         it.begin()
         it.samples(20)
         it.received(1)
+
+    def test_a_chunk_without_samples_is_refused(self, it: OpenBoard) -> None:
+        with pytest.raises(DeviceError, match=it.board.info.name):
+            it.board.configure(it.inputs(1), RATE_HZ, 0)
+
+    def test_what_was_configured_before_a_refusal_is_not_started_in_its_place(
+        self, it: OpenBoard
+    ) -> None:
+        it.board.configure(it.inputs(1), RATE_HZ, 10)
+        with pytest.raises(LimitError):
+            it.board.configure(it.inputs(1), -1.0, 10)
+        with pytest.raises(DeviceError) as caught:
+            it.board.start()
+        assert caught.value.fault is DeviceFault.STATE
 
     def test_an_input_that_is_not_there_or_named_twice_is_refused(self, it: OpenBoard) -> None:
         (first,) = it.inputs(1)

@@ -28,6 +28,7 @@ from cosmic.mico.hw.interface import (
     Controller,
     Event,
     Failed,
+    MatchedMove,
     PositionerKind,
     PositionKnownRead,
     PositionRead,
@@ -148,6 +149,14 @@ class ControllerContract:
         assert str(there[0]) in str(caught.value)
         assert len(controller.open()) == len(there)
 
+    def test_naming_some_devices_once_does_not_limit_the_next_open(
+        self, controller: Controller
+    ) -> None:
+        there = controller.find_devices()
+        controller.open(there[:1])
+        controller.close()
+        assert len(controller.open()) == len(there)
+
     def test_opening_twice_is_refused_and_leaves_the_first_in_force(
         self, opened: Controller
     ) -> None:
@@ -186,8 +195,27 @@ class ControllerContract:
             assert caught.value.fault is DeviceFault.NO_CHANNEL
             assert (caught.value.device, caught.value.channel) == (at.device, at.channel)
 
+    def test_a_number_that_32_bit_would_wrap_round_reaches_no_channel(
+        self, opened: Controller
+    ) -> None:
+        at = Channel(self.closed_loop.device, self.closed_loop.channel + 2**32)
+        self.refused(lambda: opened.ask_position(at, self.unit), DeviceFault.NO_CHANNEL)
+        self.refused(lambda: opened.stop(at), DeviceFault.NO_CHANNEL)
+
     def test_waiting_ends_without_an_event_when_nothing_happens(self, opened: Controller) -> None:
         assert opened.receive(0, 0.01) is None
+
+    @pytest.mark.parametrize("timeout_s", [math.nan, math.inf, -0.1])
+    def test_a_wait_that_has_no_end_is_refused(self, opened: Controller, timeout_s: float) -> None:
+        self.refused(lambda: opened.receive(0, timeout_s), DeviceFault.PARAMETER)
+
+    def test_devices_have_separate_queues(self, opened: Controller) -> None:
+        at = self.closed_loop
+        opened.ask_type(at)
+        for device in range(len(opened.find_devices())):
+            if device != at.device:
+                assert opened.receive(device, 0.01) is None
+        self.event(opened, TypeRead, at)
 
     def test_a_channel_reports_whether_it_has_a_sensor(self, opened: Controller) -> None:
         opened.ask_sensor_present(self.closed_loop)
@@ -207,6 +235,19 @@ class ControllerContract:
         opened.ask_position(self.closed_loop, "um" if self.unit == "deg" else "deg")
         failed = self.event(opened, Failed, self.closed_loop)
         assert failed.error.fault is DeviceFault.WRONG_KIND
+
+    def test_a_position_needs_a_sensor(self, opened: Controller) -> None:
+        if self.steps_only is None:
+            return
+        opened.ask_position(self.steps_only, "um")
+        failed = self.event(opened, Failed, self.steps_only)
+        assert failed.error.fault is DeviceFault.NO_SENSOR
+        assert (failed.error.device, failed.error.channel) == (
+            self.steps_only.device,
+            self.steps_only.channel,
+        )
+        opened.move_to(self.steps_only, 1.0, "um", hold_s=0.0)
+        assert self.event(opened, Failed, self.steps_only).error.fault is DeviceFault.NO_SENSOR
 
     def test_the_answers_of_a_channel_keep_the_order_of_the_questions(
         self, opened: Controller
@@ -311,11 +352,62 @@ class ControllerContract:
                 opened.reference(at, hold_s=hold_s)
             assert caught.value.fault is DeviceFault.PARAMETER
 
+    def test_steps_out_of_range_are_refused_and_nothing_moves(self, opened: Controller) -> None:
+        at, able = self.closed_loop, opened.device_capabilities(self.closed_loop.device)
+        (slow, fast), (low_v, high_v) = able.frequency_hz, able.amplitude_v
+        before = self.position(opened)
+        for steps, amplitude_v, frequency_hz in (
+            (able.most_steps + 1, high_v, slow),
+            (-able.most_steps - 1, high_v, slow),
+            (2**32 + 1, high_v, slow),
+            (1.5, high_v, slow),
+            (math.nan, high_v, slow),
+            (1, low_v - 0.1, slow),
+            (1, high_v + 0.1, slow),
+            (1, math.nan, slow),
+            (1, high_v, slow - 1),
+            (1, high_v, fast + 1),
+            (1, high_v, -1),
+            (1, high_v, math.nan),
+        ):
+            with pytest.raises(DeviceError) as caught:
+                opened.step(
+                    at,
+                    steps,  # type: ignore[arg-type] # what a script may give
+                    amplitude_v=amplitude_v,
+                    frequency_hz=frequency_hz,  # type: ignore[arg-type]
+                )
+            assert caught.value.fault is DeviceFault.PARAMETER
+        assert self.position(opened) == pytest.approx(before, abs=self.tolerance)
+
+    def test_what_lies_beyond_the_common_ground_is_done_or_refused(
+        self, opened: Controller
+    ) -> None:
+        at, able = self.closed_loop, opened.device_capabilities(self.closed_loop.device)
+        speed = 10.0 * abs(self.ways[0] - self.ways[1])
+        move = MatchedMove(at, self.ways[0], self.unit, FOR_EVER, speed, 50.0 * speed, 50.0)
+        if able.velocity:
+            opened.set_speed(at, speed, 50.0 * speed, self.unit)
+        else:
+            self.refused(
+                lambda: opened.set_speed(at, speed, 50.0 * speed, self.unit),
+                DeviceFault.UNSUPPORTED,
+            )
+        if able.group_start:
+            opened.move_together([move])
+            self.event(opened, Completed, at)
+            assert self.position(opened) == pytest.approx(self.ways[0], abs=self.tolerance)
+        else:
+            self.refused(lambda: opened.move_together([move]), DeviceFault.UNSUPPORTED)
+
     def test_a_frequency_out_of_range_is_refused(self, opened: Controller) -> None:
         low, high = opened.device_capabilities(self.closed_loop.device).frequency_hz
         opened.set_closed_loop_frequency(self.closed_loop, low)
         opened.set_closed_loop_frequency(self.closed_loop, high)
-        for frequency_hz in (low - 1, high + 1, -5):
+        for frequency_hz in (low - 1, high + 1, -5, 1.5, math.nan):
             with pytest.raises(DeviceError) as caught:
-                opened.set_closed_loop_frequency(self.closed_loop, frequency_hz)
+                opened.set_closed_loop_frequency(
+                    self.closed_loop,
+                    frequency_hz,  # type: ignore[arg-type] # what a script may give
+                )
             assert caught.value.fault is DeviceFault.PARAMETER

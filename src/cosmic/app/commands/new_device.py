@@ -19,10 +19,16 @@ KINDS: Final = {
     "board": Kind.BOARD,
     "camera": Kind.CAMERA,
     "lens": Kind.LENS,
+    "light": Kind.LIGHT,
+    "input": Kind.INPUT,
+    "positioner": Kind.POSITIONER,
     "procedure": Kind.PROCEDURE,
     "analysis": Kind.ANALYSIS,
     "exporter": Kind.EXPORTER,
+    "application": Kind.APPLICATION,
+    "contact": Kind.CONTACT,
 }
+_WITH_SIMULATED: Final = ("controller", "board", "camera", "lens", "light", "input")
 _TEMPLATES: Final = files("cosmic.app") / "templates"
 _ENDING: Final = ".txt"
 
@@ -37,7 +43,7 @@ def run(chosen: argparse.Namespace) -> int:
     """
     folder = write_package(chosen.kind, chosen.name, chosen.out or Path())
     sys.stdout.write(
-        f"{folder}: a package that brings {chosen.kind} {chosen.name!r}. Next:\n"
+        f"{folder}: a package that brings {KINDS[chosen.kind].word} {chosen.name!r}. Next:\n"
         f"  pip install -e {folder}\n"
         f"  pytest {folder}\n"
         f"  and read {folder / 'README.md'}\n"
@@ -65,7 +71,7 @@ def write_package(kind: str, name: str, out: Path) -> Path:
     if name == "cosmic" or name in sys.stdlib_module_names:
         raise ConfigError(f"{name!r} is the name of a module already; choose another name")
     if name in names(KINDS[kind]):
-        raise ConfigError(f"there is a {kind} {name!r} already; choose another name")
+        raise ConfigError(f"there is a {KINDS[kind].word} {name!r} already; choose another name")
     dist = f"cosmic-{name.replace('_', '-')}"
     folder = out / dist
     if folder.exists():
@@ -89,7 +95,7 @@ def _entry_points(kind: str, name: str) -> str:
         f'[project.entry-points."{KINDS[kind].value}"]',
         f'{name} = "{name}.backend:BACKEND"',
     ]
-    if kind in ("controller", "board", "camera", "lens"):
+    if kind in _WITH_SIMULATED:
         lines.append(f'{name}_simulated = "{name}.backend:SIMULATED"')
     return "\n".join([*lines, ""])
 

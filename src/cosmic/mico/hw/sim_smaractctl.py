@@ -18,7 +18,7 @@ from cosmic.mico.hw.sim_smaractctl_device import Device
 from cosmic.mico.hw.sim_smaractctl_types import Refused
 from cosmic.mico.hw.smaractctl_errors import RESULTS
 from cosmic.twin.scene import Scene
-from cosmic.twin.settings import shipped_settings
+from cosmic.twin.settings import TwinSettings, shipped_settings
 
 logger = logging.getLogger(__name__)
 
@@ -27,6 +27,8 @@ MOST_CHANNELS: Final = 18
 VERSION: Final = "1.4.3.134888"
 MAKE: Final = "smaractctl"
 _FIRST_SERIAL: Final = 412
+# What an SCU calls a linear and a rotary stage with one mark: SL...S1SS and SR...S1S5S here.
+_MARKED: Final = {"linear": 21, "rotary": 19}
 _EVENTS: Final = {
     value: name.removeprefix("SA_CTL_EVENT_")
     for name, value in vars(sa).items()
@@ -65,9 +67,18 @@ def load_simulated_library(
     if scene is None:
         time = RatedClock(rate) if clock is None else clock
         scene = Scene.from_layout(
-            layout, shipped_settings(), time, seed, channels=(1, MOST_CHANNELS)
+            layout, _with_marks(shipped_settings()), time, seed, channels=(1, MOST_CHANNELS)
         )
     return SimulatedLibrary(scene)
+
+
+def _with_marks(settings: TwinSettings) -> TwinSettings:
+    """Return settings whose stages are referenced at a mark instead of an end stop."""
+    kinds = {
+        name: kind.model_copy(update={"positioner_type": _MARKED[name]} if name in _MARKED else {})
+        for name, kind in settings.kinds.items()
+    }
+    return settings.model_copy(update={"kinds": kinds})
 
 
 class SimulatedLibrary:
