@@ -4,6 +4,7 @@ import pytest
 
 import cosmic
 from cosmic.frame.clock import WALL
+from cosmic.frame.errors import DeviceError
 from cosmic.mico.hw.interface import Channel
 from unit.mico.rigs import mico, wait_until
 
@@ -61,16 +62,15 @@ def test_stop_does_not_wait_for_a_device_thread_stuck_in_the_library_and_is_repe
         assert not controller.of("move_to")
 
 
-def test_one_channel_that_cannot_be_stopped_does_not_keep_the_others_from_it():
+@pytest.mark.parametrize("error", [DeviceError("no"), RuntimeError("of somebody else's code")])
+def test_one_channel_that_cannot_be_stopped_does_not_keep_the_others_from_it(error):
     with mico(("LLN", "LLN")) as (rig, controller):
-        from cosmic.frame.errors import DeviceError
-
-        real, failing = controller.stop, Channel(0, 0)
+        real, failing, here = controller.stop, Channel(0, 0), threading.get_ident()
 
         def stop(channel):
             real(channel)
-            if channel == failing:
-                raise DeviceError("usb is gone")
+            if channel == failing and threading.get_ident() == here:
+                raise error
 
         controller.stop = stop
         rig.application.manager.stop("test")

@@ -55,5 +55,11 @@ def make_controller(
 
 
 def join(controllers: Sequence[Controller]) -> Controller:
-    """Return `controllers` as one; a single one stays what it is."""
-    return controllers[0] if len(controllers) == 1 else JoinedController(controllers)
+    """Return `controllers` as one; a single one of ours stays what it is.
+
+    One that another package brings is joined even alone: what it raises then reaches nobody as
+    anything but a `DeviceError` that names it.
+    """
+    if len(controllers) == 1 and type(controllers[0]).__module__.startswith("cosmic."):
+        return controllers[0]
+    return JoinedController(controllers)

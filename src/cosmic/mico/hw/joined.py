@@ -1,13 +1,15 @@
 """Several controllers, of one make or of different ones, as one `Controller`."""
 
 import logging
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from functools import partial
+from typing import TypeVar, get_args
 
 from typing_extensions import override
 
-from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
+from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, NotConnectedError
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.hw.interface import (
     Capabilities,
@@ -24,6 +26,33 @@ from cosmic.mico.hw.interface import (
 logger = logging.getLogger(__name__)
 
 T = TypeVar("T")
+
+
+def asked(part: Controller, call: Callable[[], T]) -> T:
+    """Return what a call of `part` returns; raises nothing but a `CosmicError`.
+
+    A package that somebody brought raises what it likes, and must take nothing else along.
+    """
+    try:
+        return call()
+    except CosmicError:
+        raise
+    except Exception as exc:
+        raise DeviceError(f"{part.name}: {type(exc).__name__}: {exc}") from exc
+
+
+def _readdress(error: DeviceError, own: int, device: int) -> None:
+    """Have an error of a part name the device as the platform counts it."""
+    error.device = device
+    if error.args and isinstance(error.args[0], str):
+        text = re.sub(rf"^device {own}\b", f"device {device}", error.args[0])
+        error.args = (text, *error.args[1:])
+
+
+def _event(received: Event | None) -> Event | None:
+    if received is not None and not isinstance(received, get_args(Event)):
+        raise TypeError(f"{received!r} is no event of a controller")
+    return received
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +139,7 @@ class JoinedController(Controller):
                 if not there or (serials and not own):
                     logger.warning("%s: none of its devices is connected", part.name)
                     continue
-                for identity in part.open(own):
+                for identity in asked(part, partial(part.open, own)):
                     identities.append(replace(identity, index=len(places)))
                     places.append(_Place(part, identity.index))
         except DeviceError:
@@ -131,17 +160,26 @@ class JoinedController(Controller):
 
     def _close_parts(self) -> None:
         for part in self._parts:
-            part.close()
+            try:
+                part.close()
+            except Exception:  # of a package that somebody brought: the others are closed too
+                logger.exception("%s: closing failed", part.name)
 
     @override
     def receive(self, device: int, timeout_s: float) -> Event | None:
         place = self._place(device)
-        event = place.controller.receive(place.index, timeout_s)
+        try:
+            event = asked(
+                place.controller, lambda: _event(place.controller.receive(place.index, timeout_s))
+            )
+        except DeviceError as exc:
+            _readdress(exc, place.index, device)
+            raise
         if event is None:
             return None
         channel = event.channel
         if isinstance(event, Failed):
-            event.error.device = device
+            _readdress(event.error, place.index, device)
         return event if channel is None else replace(event, channel=replace(channel, device=device))
 
     @override
@@ -205,7 +243,7 @@ class JoinedController(Controller):
             raise DeviceError(text, fault=DeviceFault.PARAMETER)
         place = self._place(devices.pop())
         own = [replace(move, channel=replace(move.channel, device=place.index)) for move in moves]
-        place.controller.move_together(own)
+        asked(place.controller, lambda: place.controller.move_together(own))
 
     @override
     def calibrate(self, channel: Channel) -> None:
@@ -234,9 +272,15 @@ class JoinedController(Controller):
     def _at(self, channel: Channel, call: Callable[[Controller, Channel], T]) -> T:
         try:
             place = self._place(channel.device)
-            return call(place.controller, Channel(place.index, channel.channel))
         except DeviceError as exc:
-            exc.device, exc.channel = channel.device, channel.channel
+            exc.channel = channel.channel
+            raise
+        try:
+            own = Channel(place.index, channel.channel)
+            return asked(place.controller, lambda: call(place.controller, own))
+        except DeviceError as exc:
+            _readdress(exc, place.index, channel.device)
+            exc.channel = channel.channel
             raise
 
     def _place(self, device: int) -> _Place:
@@ -252,7 +296,7 @@ class JoinedController(Controller):
 def _connected(part: Controller) -> tuple[Serial, ...]:
     """Return the devices of one part; none of one that is not there, which the others outlive."""
     try:
-        return part.find_devices()
+        return asked(part, part.find_devices)
     except NotConnectedError as exc:
         logger.error("%s: %s", part.name, exc)
         return ()

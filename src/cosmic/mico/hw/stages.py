@@ -198,12 +198,18 @@ class _Open:
         try:
             with self.busy:
                 return work()
-        except self.unit.errors as exc:
-            fault = self.unit.fault(exc)
-            said = f"{where(self.index, axis)}: {asked}: {str(exc) or type(exc).__name__}"
+        except Exception as exc:  # the code of somebody else, which raises what it likes
+            fault, text = self._meant(exc)
+            said = f"{where(self.index, axis)}: {asked}: {text}"
             raise DeviceError(said, fault=fault, device=self.index, channel=axis) from exc
         finally:
             self.make_stops()
+
+    def _meant(self, exc: Exception) -> tuple[DeviceFault, str]:
+        """Return what an exception of the library means, and what is said of it."""
+        if isinstance(exc, self.unit.errors):
+            return self.unit.fault(exc), str(exc) or type(exc).__name__
+        return DeviceFault.OTHER, f"{type(exc).__name__}: {exc}"
 
     def make_stops(self) -> DeviceError | None:
         """Make the stops that are wanted, unless somebody else has the library and will.
@@ -215,9 +221,11 @@ class _Open:
             try:
                 while self.stops:
                     self.unit.stop(self.stops.popleft())
-            except self.unit.errors as exc:
-                said = f"{where(self.index)}: a stop failed: {str(exc) or type(exc).__name__}"
-                failed = DeviceError(said, fault=self.unit.fault(exc), device=self.index)
+            except Exception as exc:
+                fault, text = self._meant(exc)
+                said = f"{where(self.index)}: a stop failed: {text}"
+                logger.exception("%s", said)
+                failed = DeviceError(said, fault=fault, device=self.index)
                 self.events.append(Failed(None, failed))
             finally:
                 self.busy.release()
@@ -313,6 +321,10 @@ class StageController(Controller):
                 units.append(open_unit())
             except NotConnectedError as exc:
                 logger.warning("%s", exc)
+            except DeviceError:
+                raise
+            except Exception:  # the code of somebody else: its other devices are opened
+                logger.exception("%s: a device cannot be opened", self._title)
         return units
 
     @override
@@ -581,5 +593,5 @@ def _answered(question: Callable[[], Event]) -> Event:
 def _close(unit: StageUnit) -> None:
     try:
         unit.close()
-    except unit.errors as exc:
-        logger.debug("closing %s: %s", unit.serial, exc)
+    except Exception:
+        logger.exception("closing %s", unit.serial)

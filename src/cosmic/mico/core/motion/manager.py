@@ -230,6 +230,8 @@ class DeviceThreads:
                 self._controller.stop(device.container.address(channel))
             except DeviceError as exc:
                 logger.error("device %d channel %d: stop failed: %s", device.index, channel, exc)
+            except Exception:  # of a controller that somebody brought: the others are stopped too
+                logger.exception("device %d channel %d: stop failed", device.index, channel)
 
     def end(self, devices: Iterable[Device]) -> None:
         """Stop every channel, end the threads that run, and stop every channel once more."""
