@@ -1,5 +1,6 @@
 """What a package outside of the tree brings works on a platform that names it."""
 
+import re
 import sys
 import textwrap
 from collections.abc import Callable, Iterator
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import cosmic
+from contract.station_rig import wait_until
 from cosmic.app.cli import main
 from cosmic.frame.plugins import find_backend
 
@@ -295,3 +297,90 @@ def test_the_only_controller_that_cannot_be_loaded_is_named(with_broken: Edit) -
     folder = with_broken(('[mico]\nbackend = "simulated" ', '[mico]\nbackend = "broken" '))
     with pytest.raises(cosmic.NotConnectedError, match=r"brokenware 0\.3.*no_such_package"):
         cosmic.connect(folder, applications=("mico",))
+
+
+TROUBLE = """
+from cosmic.daqco.hw.interface import BoardBackend
+from cosmic.daqco.hw.sim_library import SimulatedLibrary
+from cosmic.frame.config import StrictModel
+from cosmic.frame.errors import NotConnectedError
+from cosmic.vico.hw.interface import CameraBackend
+
+BROKEN = []
+
+
+class Brought:
+    def __init__(self, real):
+        self._real = real
+
+    def __getattr__(self, name):
+        return getattr(self._real, name)
+
+    def receive(self, timeout_s):
+        if BROKEN:
+            return BROKEN[0]()
+        return self._real.receive(timeout_s)
+
+
+class Library:
+    def __init__(self, real):
+        self._real = real
+
+    def __getattr__(self, name):
+        return getattr(self._real, name)
+
+    def open(self, name):
+        return Brought(self._real.open(name))
+
+
+def boards(_options, context):
+    return Library(SimulatedLibrary(context.clock, context.scene_sources))
+
+
+BOARDS = BoardBackend(boards)
+"""
+
+
+def test_a_board_that_raises_or_gives_garbage_is_named_and_the_axes_go_on(
+    laboratory: Edit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = f"trouble_of_{tmp_path.name.replace('-', '_')}"
+    described = tmp_path / "trouble" / "troubleware-0.4.dist-info"
+    described.mkdir(parents=True)
+    (described.parent / f"{module}.py").write_text(TROUBLE, encoding="utf-8")
+    (described / "METADATA").write_text("Name: troubleware\nVersion: 0.4\n", encoding="utf-8")
+    points = f"[cosmic.boards]\ntrouble = {module}:BOARDS\n"
+    (described / "entry_points.txt").write_text(points, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(described.parent))
+    folder = laboratory(
+        ('[daqco]\nbackend = "simulated"', '[daqco]\nbackend = "trouble"'),
+        (APPLICATIONS, 'applications = ["mico", "daqco"]'),
+    )
+
+    def boom() -> None:
+        raise RuntimeError("boom")
+
+    with cosmic.connect(folder, rate=1.0) as rig:
+
+        def acquiring() -> bool:
+            try:
+                return "force" in rig.daqco.latest()
+            except cosmic.NotAvailable:
+                return False
+
+        broken = sys.modules[module].BROKEN
+        rig.daqco.disarm_limit("force")
+        for what, said in (
+            (boom, r"Dev\d: RuntimeError: boom"),
+            (lambda: "abc", r"Dev\d: AttributeError"),
+        ):
+            rig.daqco.start()
+            assert wait_until(acquiring)
+            broken.append(what)
+            assert wait_until(lambda: not rig.daqco.running)
+            assert re.search(said, rig.daqco.problem)
+            rig.reset_stop()  # a limit may have been armed, which nobody watched any more
+            assert rig.mico["left.x"].move_by(5.0) is not None
+            broken.clear()
+        rig.daqco.start()
+        assert wait_until(acquiring)

@@ -1,6 +1,7 @@
 """The one tree of exceptions; everything CoSMic raises on purpose is a `CosmicError`."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 
 from typing_extensions import override
@@ -178,3 +179,17 @@ def needs_extra(what: str, extra: str) -> str:
 def refusal(verdict: MoveVerdict) -> MoveRefused:
     """Return the exception that says `verdict`."""
     return _REFUSALS.get(verdict.reason, MoveRefused)(verdict)
+
+
+@contextmanager
+def only_cosmic_errors(whom: str) -> Iterator[None]:
+    """Have whatever the code of another package raises leave as a `DeviceError` that names it.
+
+    Such a package raises what it likes, and must take nothing else along.
+    """
+    try:
+        yield
+    except CosmicError:
+        raise
+    except Exception as exc:
+        raise DeviceError(f"{whom}: {type(exc).__name__}: {exc}") from exc

@@ -1,5 +1,6 @@
 """`BoardGroup`: the boards of one acquisition, received from by one call."""
 
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -7,7 +8,9 @@ import numpy as np
 
 from cosmic.daqco.hw.interface import Board, BoardChunk, InputSettings, OverrunError
 from cosmic.frame.clock import WALL
-from cosmic.frame.errors import DeviceError, DeviceFault
+from cosmic.frame.errors import DeviceError, DeviceFault, only_cosmic_errors
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +71,7 @@ class BoardGroup:
         self._boards = tuple(boards)
         self._clocked = frozenset(clocked)
         self._pieces: dict[int, BoardChunk] = {}
+        self._shapes: list[tuple[int, int]] = []
         self._drift_ppm = 2.0 * clock_ppm
         self._agreement: tuple[ClockAgreement, ...] = ()
 
@@ -93,10 +97,11 @@ class BoardGroup:
         DeviceError
             A board is gone or taken, or they make different rates of this one.
         """
-        rates = [
-            board.configure(inputs[board.info.name], rate_hz, chunk_samples)
-            for board in self._boards
-        ]
+        rates: list[float] = []
+        for board in self._boards:
+            with only_cosmic_errors(board.info.name):
+                rates.append(board.configure(inputs[board.info.name], rate_hz, chunk_samples))
+        self._shapes = [(len(inputs[board.info.name]), chunk_samples) for board in self._boards]
         if max(rates) - min(rates) > 1e-6 * self._drift_ppm * min(rates):
             given = ", ".join(f"{rate:g} Hz" for rate in sorted(set(rates)))
             raise DeviceError(
@@ -113,7 +118,8 @@ class BoardGroup:
         in_order = sorted(self._boards, key=lambda board: board.info.name not in self._clocked)
         try:
             for board in in_order:
-                board.start()
+                with only_cosmic_errors(board.info.name):
+                    board.start()
         except DeviceError:
             self.stop()
             raise
@@ -132,10 +138,10 @@ class BoardGroup:
         """
         until_s = WALL.now_s() + timeout_s
         try:
-            for number, board in enumerate(self._boards):
+            for number in range(len(self._boards)):
                 # All are looked at: one that failed may be what another waits for.
                 if number not in self._pieces:
-                    piece = board.receive(max(0.0, until_s - WALL.now_s()))
+                    piece = self._piece(number, until_s - WALL.now_s())
                     if piece is not None:
                         self._pieces[number] = piece
             if len(self._pieces) < len(self._boards):
@@ -146,10 +152,24 @@ class BoardGroup:
             self.stop()
             raise
 
+    def _piece(self, number: int, wait_s: float) -> BoardChunk | None:
+        """Return the next chunk of one board; raises `DeviceError`, also where it is none."""
+        board = self._boards[number]
+        with only_cosmic_errors(board.info.name):
+            piece = board.receive(max(0.0, wait_s))
+            if piece is not None and piece.volts.shape != self._shapes[number]:
+                raise ValueError(
+                    f"a chunk of shape {piece.volts.shape} came instead of {self._shapes[number]}"
+                )
+            return piece
+
     def stop(self) -> None:
         """End acquiring; harmless when nothing runs. A `receive` that waits returns None."""
         for board in self._boards:
-            board.stop()
+            try:
+                board.stop()
+            except Exception:  # of somebody else's board: the others are stopped too
+                logger.exception("%s: stop failed", board.info.name)
 
     def _joined(self, pieces: list[BoardChunk]) -> BoardChunk:
         first, *others = pieces

@@ -9,7 +9,12 @@ from typing import TypeVar, get_args
 
 from typing_extensions import override
 
-from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, NotConnectedError
+from cosmic.frame.errors import (
+    DeviceError,
+    DeviceFault,
+    NotConnectedError,
+    only_cosmic_errors,
+)
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.hw.interface import (
     Capabilities,
@@ -29,16 +34,9 @@ T = TypeVar("T")
 
 
 def asked(part: Controller, call: Callable[[], T]) -> T:
-    """Return what a call of `part` returns; raises nothing but a `CosmicError`.
-
-    A package that somebody brought raises what it likes, and must take nothing else along.
-    """
-    try:
+    """Return what a call of `part` returns; raises nothing but a `CosmicError`."""
+    with only_cosmic_errors(part.name):
         return call()
-    except CosmicError:
-        raise
-    except Exception as exc:
-        raise DeviceError(f"{part.name}: {type(exc).__name__}: {exc}") from exc
 
 
 def _readdress(error: DeviceError, own: int, device: int) -> None:

@@ -6,6 +6,7 @@ from queue import Empty, SimpleQueue
 from threading import Condition, Lock
 from typing import Final
 
+import numpy as np
 from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
@@ -17,6 +18,7 @@ from cosmic.frame.errors import (
     DeviceFault,
     NotAvailable,
     NotConnectedError,
+    only_cosmic_errors,
 )
 from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
@@ -44,6 +46,13 @@ REFUSALS: Final = frozenset({DeviceFault.BUSY, DeviceFault.PARAMETER, DeviceFaul
 
 Receiver = Callable[[CameraImage], object]
 Command = Callable[[Camera], None]
+
+
+def _is_image(data: object) -> bool:
+    """Whether these are pixels: 8 or 16 bits without sign, in two or three dimensions."""
+    return (
+        isinstance(data, np.ndarray) and data.dtype in (np.uint8, np.uint16) and data.ndim in (2, 3)
+    )
 
 
 class CameraThread(WorkerThread):
@@ -272,9 +281,10 @@ class CameraThread(WorkerThread):
         """Open the camera and take images until the end, another camera or a failure."""
         self._reopen = False
         self._close()
-        self._camera = camera = self._open_camera()
-        self._settings = self._as_before(camera)
-        self._keep(camera)
+        with only_cosmic_errors(self.camera_name):
+            self._camera = camera = self._open_camera()
+            self._settings = self._as_before(camera)
+            self._keep(camera)
         logger.info("%s: %s %s connected", self.name, camera.info.vendor, camera.info.model)
         if self._wanted_running:
             self._begin(camera)
@@ -285,7 +295,7 @@ class CameraThread(WorkerThread):
             if not self._running:
                 self._end_requested.wait(LOOK_S)
                 continue
-            frame = camera.receive(LOOK_S)
+            frame = self._receive(camera)
             if frame is not None:
                 self._hand_on(frame, camera.settings)
 
@@ -305,9 +315,18 @@ class CameraThread(WorkerThread):
         if self._settings is not None:
             self._kept = camera.info.key, self._settings
 
+    def _receive(self, camera: Camera) -> Frame | None:
+        """Return the next frame; raises `DeviceError`, also where it is none."""
+        with only_cosmic_errors(self.camera_name):
+            frame = camera.receive(LOOK_S)
+            if frame is not None and frame.ready and not _is_image(frame.data):
+                raise TypeError("what came is no image of whole numbers, height by width")
+            return frame
+
     def _begin(self, camera: Camera) -> None:
         self._last_id = None
-        camera.start()
+        with only_cosmic_errors(self.camera_name):
+            camera.start()
         self._running = True
 
     def _restart(self, camera: Camera, settings: CameraSettings, before: CameraSettings) -> None:
@@ -329,7 +348,8 @@ class CameraThread(WorkerThread):
             except Empty:
                 return
             try:
-                command(camera)
+                with only_cosmic_errors(self.camera_name):
+                    command(camera)
             except CosmicError as exc:
                 task.fail(exc)
                 if isinstance(exc, DeviceError) and exc.fault not in REFUSALS:
