@@ -25,6 +25,7 @@ LONG = frozenset(
         "acquisition_soak",
         "adversary",
         "campaign",
+        "campaign_day",
         "campaign_faults",
         "campaign_kills",
         "campaign_worlds",
