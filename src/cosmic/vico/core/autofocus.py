@@ -44,6 +44,8 @@ SURE_PX: Final = 0.5
 REACH_PX: Final = 5.0
 """Farther off, two images show too little to be believed."""
 LEARNED_FROM: Final = 12
+AS_SHARP, SHARPER = 0.99, 1.03
+"""What two images find is as sharp as the better of them, and sharper than the other."""
 
 
 class Autofocus:
@@ -110,7 +112,8 @@ class Autofocus:
         # Where only dust on the sensor is seen, which is always sharp, both agree in a wrong one.
         self._lens.seek(LensAxis.FOCUS, max(0, round(found.position - apart))).wait(MOVE_S)
         there = self._image_at(found.position)
-        if not _edges(there) > max(_edges(one), _edges(other)):
+        low, high = sorted((_edges(one), _edges(other)))
+        if not (_edges(there) >= AS_SHARP * high and _edges(there) >= SHARPER * low):
             logger.info("autofocus: what two images found is not sharper than they are; it sweeps")
             return None
         return found.position, f"sharpest at {found.position:.4g} ± {found.std:.2g}"
