@@ -188,6 +188,10 @@ class EpicsGateway:
         """Carry out a command of MiCo and await its end; raises `CosmicError`."""
         await self._run(who, "mico", function, arguments, keys)
 
+    def may_move(self, who: Who) -> bool:
+        """Return whether a client holds the right to move."""
+        return self._session(who).in_control
+
     async def look(self, axis: str) -> PositionerState:
         """Return the newest state of an axis."""
         host = self._hosts["mico"]

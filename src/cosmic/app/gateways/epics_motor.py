@@ -33,6 +33,9 @@ class Commander(Protocol):
     async def look(self, axis: str) -> PositionerState:
         """Return the newest state of an axis."""
 
+    def may_move(self, who: Who) -> bool:
+        """Return whether a client holds the right to move."""
+
 
 class MotorRecord:
     """A motor record in front of one axis; in the loop of the server.
@@ -59,6 +62,7 @@ class MotorRecord:
         self._axis = axis
         self._unit = state.unit
         self._zero = state.zero
+        self._newest = state
         self._commander = commander
         self._moves = 0
         self._in_motion = state.in_motion
@@ -119,7 +123,7 @@ class MotorRecord:
 
     async def show(self, state: PositionerState) -> None:
         """Show the axis as it is."""
-        self._zero = state.zero
+        self._zero, self._newest = state.zero, state
         fields, alarm = self._fields, self._state_alarm(state)
         if state.position is not None:
             await ca.show(fields["RBV"], state.position - state.zero, alarm)
@@ -187,6 +191,9 @@ class MotorRecord:
 
     async def _move(self, who: Who, motion: dict[str, Any], shown: float | None) -> None:
         """Carry out one motion; the record says that it moves until the axis is at rest."""
+        allowed = self._commander.may_move(who)
+        if self._moves and not allowed:
+            raise PutRefused("it moves for another client")  # who is not to notice
         self._moves += 1
         self._alarm = ca.NO_ALARM
         if shown is not None:
@@ -196,7 +203,8 @@ class MotorRecord:
             failure = await self._failure(who, motion)
             self._alarm = _alarm_of(failure)
             await ca.show(self._reason, "" if failure is None else str(failure)[:499])
-            await self.show(await self._commander.look(self._axis))
+            # Whoever may not move has moved nothing; many of them are not to keep others waiting.
+            await self.show(await self._commander.look(self._axis) if allowed else self._newest)
             await asyncio.sleep(EDGE_S)
         finally:
             self._moves -= 1

@@ -1,0 +1,96 @@
+"""A motor record while others write to it who may not move anything."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from caproto import CAStatus
+
+from cosmic.app.gateways import epics_channels as ca
+from cosmic.app.gateways.epics_channels import Who
+from cosmic.app.gateways.epics_motor import MotorRecord
+from cosmic.frame.errors import refusal
+from cosmic.frame.verdict import Reason, refuse
+from cosmic.mico.core.motion.positioner import PositionerState
+from cosmic.mico.hw.interface import Channel, PositionerKind
+
+DONE = int(CAStatus.ECA_NORMAL.value.code_with_severity)
+HOLDER = Who(("127.0.0.1", 1), "here", "holder")
+STRANGER = Who(("127.0.0.1", 2), "there", "stranger")
+STATE = PositionerState(
+    "left.x", Channel(0, 0), PositionerKind.LINEAR, "um", limits=(-100.0, 100.0), position=0.0
+)
+
+
+class Commander:
+    """Moves for the holder until `arrive` is set; counts what it is asked for."""
+
+    def __init__(self) -> None:
+        self.looks = 0
+        self.runs = 0
+        self.arrive = asyncio.Event()
+
+    async def run(
+        self, who: Who, _function: str, _arguments: dict[str, Any], _keys: tuple[str, ...]
+    ) -> None:
+        self.runs += 1
+        if who != HOLDER:
+            raise refusal(refuse(Reason.NO_LEASE, "the right to move is held by holder"))
+        await self.arrive.wait()
+
+    async def look(self, _axis: str) -> PositionerState:
+        self.looks += 1
+        return STATE
+
+    def may_move(self, who: Who) -> bool:
+        return who == HOLDER
+
+
+async def put(record: MotorRecord, who: Who, value: float) -> bool:
+    """Write to VAL as the server does; False where it was refused."""
+    channel = record.channels["R"]
+    status = await channel.auth_write(
+        who.host, who.user, [value], channel.data_type, None, user_address=who.address
+    )
+    return bool(status == DONE)
+
+
+def with_record(act: Callable[[MotorRecord, Commander], Awaitable[None]]) -> None:
+    async def body() -> None:
+        commander = Commander()
+        await act(MotorRecord("R", "left.x", STATE, commander, 0.5), commander)
+
+    asyncio.run(body())
+
+
+def test_who_may_not_move_changes_nothing_while_it_moves_for_another() -> None:
+    async def act(record: MotorRecord, commander: Commander) -> None:
+        moving = asyncio.ensure_future(put(record, HOLDER, 10.0))
+        await asyncio.sleep(0.01)
+        shown = {name: each.value for name, each in record.channels.items()}
+        assert shown["R.DMOV"] == 0
+        for _ in range(20):
+            assert not await put(record, STRANGER, -50.0)
+        assert {name: each.value for name, each in record.channels.items()} == shown
+        assert record.channels["R.RBV"].alarm.severity == ca.NO_ALARM[1]
+        assert (commander.runs, commander.looks) == (1, 0), "nobody waits for what was refused"
+        commander.arrive.set()
+        assert await moving
+        assert record.channels["R.DMOV"].value == 1
+        assert record.channels["R.VAL"].value == 10.0
+
+    with_record(act)
+
+
+def test_a_refused_put_at_rest_is_shown_and_keeps_nobody_waiting() -> None:
+    async def act(record: MotorRecord, commander: Commander) -> None:
+        assert not await put(record, STRANGER, -50.0)
+        assert record.channels["R.RBV"].alarm.status == ca.ALARMS["NO_LEASE"][0]
+        assert record.channels["R.DMOV"].value == 1
+        assert (commander.runs, commander.looks) == (1, 0)
+        commander.arrive.set()
+        assert await put(record, HOLDER, 10.0)
+        assert record.channels["R.RBV"].alarm.severity == ca.NO_ALARM[1]
+        assert commander.looks == 1
+
+    with_record(act)
