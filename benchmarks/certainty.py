@@ -3,15 +3,17 @@
 `--fit` draws the population of `fibre_pairs`, finds its fibres and prints the weights for
 `cosmic.vico.core.vision.certainty`. Without it they are checked: on images of `fibre_pairs` that
 were not fitted, on pairs drawn in the other way of `fibre_images`, on JPEG and on fields of twenty.
-`--images FOLDER` counts the certain ones on photographs as well.
+`--images FOLDER` counts the certain ones on photographs as well; `--count N` draws N pairs.
 """
 
 import argparse
 import sys
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from unittest.mock import patch
 
 import cv2
 import numpy as np
@@ -22,6 +24,9 @@ from benchmarks.fibre_pairs import TOLD_APART, Drawn, Kind, draw
 from benchmarks.figures import Figure
 from cosmic.vico.api import Fibre, find_fibres
 from cosmic.vico.core.vision import axial, beyond, certainty
+from cosmic.vico.core.vision.grey import Mask
+from cosmic.vico.core.vision.profiles import Scene
+from cosmic.vico.core.vision.refine import Course
 
 NAME = "certainty"
 PAIRS = (Kind.TOUCHING, Kind.OVERLAPPING, Kind.GAP)
@@ -30,8 +35,10 @@ FITTED = range(3000)
 CHECKED = range(50_000, 52_000)
 LENGTH_PART = 0.03
 OWN = {axial.GAP, axial.DOUBLED, axial.STEP, beyond.GOES_ON, beyond.SOFT, certainty.IMPROBABLE}
-GRIP = 1e-5
+GRIP = 1e-4
 """How strongly weights are kept small in the fit."""
+LEAST_WEIGHT = 0.1
+ROUNDS = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,36 +78,78 @@ def tellable(one: Drawn) -> bool:
     return one.kind not in PAIRS or one.apart >= TOLD_APART
 
 
-def fit(seeds: Iterable[int]) -> tuple[np.ndarray, float, float]:
-    """Return the weights, the logit alone, right for each wrong, and how wide an interval is."""
-    rows, labels, pulls = [], [], []
-    for seed in seeds:
-        one = draw(MIX[seed % len(MIX)], seed, large=seed % 7 == 0)
-        if not tellable(one):
-            continue
-        for case in drawn_cases(one):
+@contextmanager
+def recorded() -> Iterator[list[certainty.Signs]]:
+    """Keep the signs of everything that is found meanwhile, all along each fibre."""
+    found: list[certainty.Signs] = []
+
+    def signs_of(scene: Scene, course: Course, explained: Mask) -> certainty.Signs:
+        found.append(original(scene, course, explained))
+        return found[-1]
+
+    original = certainty.signs_of
+    with patch.object(certainty, "signs_of", signs_of):
+        yield found
+
+
+@dataclass(slots=True, eq=False)
+class Learned:
+    """What a fit learns from: the signs of each case, and whether it is right.
+
+    Attributes
+    ----------
+    pulls : list of float
+        Errors of the length of whole fibres without a sign, in standard deviations.
+    """
+
+    signs: list[certainty.Signs] = field(default_factory=list)
+    right: list[bool] = field(default_factory=list)
+    pulls: list[float] = field(default_factory=list)
+
+    def add(self, one: Drawn) -> None:
+        """Find the fibres on an image, and add them."""
+        with recorded() as signs:
+            found = drawn_cases(one)
+        for case in found:
             # What thins and is found whole shows all signs of what it is not.
             if set(case.fibre.doubts) - OWN or (case.right and one.kind is Kind.GOES_ON):
                 continue
-            signs = np.array(case.fibre.signs)
-            rows.append(signs**certainty.STEEPNESS)
-            labels.append(case.right)
-            if case.right and signs.max() < 1.0:
-                pulls.append(abs(case.fibre.length_px - case.length_px) / case.fibre.length_std_px)
-    x, y = np.array(rows), np.where(np.array(labels), 1.0, -1.0)
+            own = next(each for each in signs if each.values == case.fibre.signs)
+            self.signs.append(own)
+            self.right.append(case.right)
+            if case.right and not own.doubts:
+                pull = abs(case.fibre.length_px - case.length_px) / case.fibre.length_std_px
+                self.pulls.append(pull)
 
-    def loss(state: np.ndarray) -> tuple[float, np.ndarray]:
-        logit = state[-1] - x @ state[:-1]
-        miss = 1.0 / (1.0 + np.exp(np.clip(y * logit, -40.0, 40.0)))
-        value = np.logaddexp(0.0, -y * logit).mean() + GRIP * float(state[:-1] @ state[:-1])
-        slope = (y * miss) @ x / len(y) + 2.0 * GRIP * state[:-1]
-        return float(value), np.append(slope, -(y * miss).mean())
 
-    start = np.append(np.full(x.shape[1], 5.0), 6.0)
-    bounds = [(0.0, None)] * x.shape[1] + [(None, None)]
-    best = minimize(loss, start, jac=True, bounds=bounds, method="L-BFGS-B")
+def fit(seeds: Iterable[int]) -> tuple[np.ndarray, float, float]:
+    """Return weights and the logit alone, right for each wrong, and how wide an interval is.
+
+    A joint is in one place: of each fibre the signs of the place count where together they weigh
+    most. Which that is depends on the weights, so that both are found in turn.
+    """
+    learned = Learned()
+    for seed in seeds:
+        one = draw(MIX[seed % len(MIX)], seed, large=seed % 7 < 2)
+        if tellable(one):
+            learned.add(one)
+    y = np.where(np.array(learned.right), 1.0, -1.0)
+    state = np.append(np.full(len(certainty.NAMES), 2.0), 8.0)
+    for number in range(ROUNDS):
+        x = np.array([each.weighed_by(state[:-1]) for each in learned.signs])
+
+        def loss(state: np.ndarray, x: np.ndarray = x) -> tuple[float, np.ndarray]:
+            logit = state[-1] - x @ state[:-1]
+            miss = 1.0 / (1.0 + np.exp(np.clip(y * logit, -40.0, 40.0)))
+            value = np.logaddexp(0.0, -y * logit).mean() + GRIP * float(state[:-1] @ state[:-1])
+            slope = (y * miss) @ x / len(y) + 2.0 * GRIP * state[:-1]
+            return float(value), np.append(slope, -(y * miss).mean())
+
+        bounds = [(LEAST_WEIGHT, None)] * x.shape[1] + [(None, None)]
+        best = minimize(loss, state, jac=True, bounds=bounds, method="L-BFGS-B").x
+        state = best if number == ROUNDS - 1 else 0.5 * (state + best)
     odds = float((y > 0).sum() / max(1, (y < 0).sum()))
-    return best.x, odds, float(np.percentile(pulls, 95))
+    return state, odds, float(np.percentile(learned.pulls, 95))
 
 
 def split(seed: int) -> tuple[np.ndarray, list[np.ndarray], float]:
@@ -170,7 +219,7 @@ class Counted:
 def pairs(seeds: Iterable[int], *, jpeg: bool | None) -> Iterator[tuple[Drawn, list[Case]]]:
     """Yield drawn pairs of the three kinds in turn."""
     for seed in seeds:
-        one = draw(PAIRS[seed % 3], seed, jpeg=jpeg, large=seed % 7 == 0)
+        one = draw(PAIRS[seed % 3], seed, jpeg=jpeg, large=seed % 7 < 2)
         yield one, drawn_cases(one)
 
 
@@ -187,7 +236,7 @@ def rows(count: int) -> list[Figure]:
     jpeg = [wrong(found) for one, found in pairs(CHECKED[: count // 2], jpeg=True) if tellable(one)]
     single = Counted()
     for seed in CHECKED[: count // 4]:
-        drawn = drawn_cases(draw(Kind.SINGLE, seed, jpeg=False, large=seed % 7 == 0))
+        drawn = drawn_cases(draw(Kind.SINGLE, seed, jpeg=False, large=seed % 7 < 2))
         single.images += 1
         single.wrong += wrong(drawn)
         single.certain += any(case.fibre.certain and case.right for case in drawn)
@@ -254,10 +303,10 @@ def photographs(folder: Path) -> list[Figure]:
     return [Figure(NAME, "photographs with a certain fibre", certain, f"of {len(files)}")]
 
 
-def measure(quick: bool, images: Path | None = None) -> list[Figure]:
-    """Measure everything."""
+def measure(quick: bool, images: Path | None = None, count: int = len(CHECKED)) -> list[Figure]:
+    """Measure everything, on `count` pairs and fewer of the rest."""
     cv2.setNumThreads(1)
-    return rows(40 if quick else len(CHECKED)) + (photographs(images) if images else [])
+    return rows(40 if quick else count) + (photographs(images) if images else [])
 
 
 def print_fit() -> None:
@@ -274,8 +323,9 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--images", type=Path)
     parser.add_argument("--fit", action="store_true")
+    parser.add_argument("--count", type=int, default=len(CHECKED))
     chosen, sys.argv[1:] = parser.parse_known_args()
     if chosen.fit:
         print_fit()
     else:
-        figures.main(__doc__, partial(measure, images=chosen.images))
+        figures.main(__doc__, partial(measure, images=chosen.images, count=chosen.count))

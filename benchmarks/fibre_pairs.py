@@ -13,7 +13,10 @@ import numpy as np
 
 FINE = 4
 SHIFT = 4
+OUTLINE_PX = 0.5 / FINE
 STEP_PX = 2.0
+DUST_PX2 = 25_000
+"""One speck of dust at most on so many pixels."""
 TOLD_APART = 12.0
 """Standard deviations of noise, summed over all pixels, from which a pair differs from one."""
 
@@ -67,6 +70,8 @@ class View:
     opaque: bool
     jpeg: int | None
     lumen: float
+    shade: float = 0.0
+    light_from: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +125,7 @@ def wandering(rng: np.random.Generator, count: int, spread: float, wave: float) 
 def piece(rng: np.random.Generator, length: float, width: float, rough: float) -> Piece:
     """Return a fibre from (0, 0) along x."""
     line = curved(rng, length, float(rng.uniform(0.0, 1.2)), width)
-    wave = max(2.0, 3.0 * width / STEP_PX)
+    wave = max(2.0, float(rng.uniform(1.0, 6.0)) * width / STEP_PX)
     return Piece(
         line,
         width * np.clip(wandering(rng, len(line), rough, wave), 0.7, 1.3),
@@ -135,11 +140,13 @@ def cover(shape: tuple[int, int], one: Piece, part: float = 1.0) -> np.ndarray:
     tangent = np.gradient(one.line_px, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
-    half = 0.5 * part * one.width_px[:, None]
+    # OpenCV paints the outline as well, half a fine pixel beyond the polygon.
+    half = 0.5 * part * one.width_px[:, None] - OUTLINE_PX
     left, right = one.line_px + half * normal, one.line_px - half * normal
     for end, slant in zip((0, -1), one.slants, strict=True):
-        left[end] = left[end] + slant * half[end] * tangent[end]
-        right[end] = right[end] - slant * half[end] * tangent[end]
+        inward = OUTLINE_PX * (tangent[0] if end == 0 else -tangent[-1])
+        left[end] = left[end] + slant * half[end] * tangent[end] + inward
+        right[end] = right[end] - slant * half[end] * tangent[end] + inward
     corners = np.stack([left[:-1], left[1:], right[1:], right[:-1]], axis=1)
     fixed = np.round(((corners + 0.5) * FINE - 0.5) * 2**SHIFT).astype(np.int32)
     level = np.clip(np.round(170.0 * 0.5 * (one.taken[1:] + one.taken[:-1])), 1, 255)
@@ -184,22 +191,31 @@ def view_of(rng: np.random.Generator, *, jpeg: bool, large: bool) -> View:
         shape=(720, 960) if large else (320, 640),
         ground=60.0 if lighter else float(rng.uniform(130.0, 190.0)),
         contrast=contrast if lighter else -contrast,
-        blur_px=float(rng.uniform(0.7, 1.8)),
+        blur_px=float(rng.uniform(0.7, 1.8) if rng.integers(0, 5) else rng.uniform(1.8, 4.5)),
         noise=float(rng.uniform(1.0, 6.0)),
         uneven=float(rng.uniform(0.0, 0.3)),
         opaque=bool(rng.integers(0, 2)),
         jpeg=int(rng.integers(10, 96)) if jpeg else None,
         lumen=float(rng.choice([0.0, 0.0, 0.4])),
+        shade=float(rng.integers(0, 2) * rng.uniform(0.0, 0.3)),
+        light_from=float(rng.uniform(0.0, 6.28)),
     )
 
 
 def light_of(rng: np.random.Generator, view: View) -> np.ndarray:
-    """Return light that falls off to a side."""
+    """Return light that falls off to a side, and is taken away by dust in half of the images."""
     rows, columns = view.shape
     y, x = np.mgrid[0:rows, 0:columns].astype(np.float32)
     angle = rng.uniform(0.0, 6.28)
     across = (x / columns - 0.5) * np.cos(angle) + (y / rows - 0.5) * np.sin(angle)
-    return np.asarray(1.0 + view.uneven * across, dtype=np.float32)
+    light = np.asarray(1.0 + view.uneven * across, dtype=np.float32)
+    for _ in range(int(rng.integers(0, 2) * rng.integers(1, 1 + rows * columns // DUST_PX2))):
+        at = (int(rng.integers(0, columns)), int(rng.integers(0, rows)))
+        axes = (int(rng.integers(1, 6)), int(rng.integers(1, 6)))
+        speck = np.zeros(view.shape, np.float32)
+        cv2.ellipse(speck, at, axes, float(rng.uniform(0.0, 180.0)), 0, 360, 1.0, -1)
+        light *= 1.0 - float(rng.uniform(0.1, 0.4)) * speck
+    return light
 
 
 def together(
@@ -318,6 +334,14 @@ def placed(rng: np.random.Generator, pieces: list[Piece], view: View) -> list[Pi
     return [replace(each, line_px=line + shift) for each, line in zip(pieces, lines, strict=True)]
 
 
+def shaded(one: Piece, view: View) -> Piece:
+    """Return a fibre lit from a side: it is lighter or darker where it runs in some direction."""
+    tangent = np.gradient(one.line_px, axis=0)
+    angle = np.arctan2(tangent[:, 1], tangent[:, 0])
+    taken = one.taken * (1.0 + view.shade * np.cos(2.0 * (angle - view.light_from)))
+    return replace(one, taken=np.clip(taken, 0.5, 1.45))
+
+
 def draw(kind: Kind, seed: int, *, jpeg: bool | None = None, large: bool = False) -> Drawn:
     """Return an image of one kind."""
     rng = np.random.default_rng([seed, list(Kind).index(kind)])
@@ -325,12 +349,14 @@ def draw(kind: Kind, seed: int, *, jpeg: bool | None = None, large: bool = False
         view = view_of(
             rng, jpeg=bool(rng.integers(0, 3) == 0) if jpeg is None else jpeg, large=large
         )
-        width = float(rng.uniform(5.0, 18.0))
-        rough = float(rng.choice([0.0, 0.02, 0.05]))
-        pieces, gap = _pieces(rng, kind, width, rough, 1.4 if large else 1.0)
+        long = large and bool(rng.integers(0, 2))
+        width = float(rng.uniform(5.0, 9.0) if long else rng.uniform(5.0, 18.0))
+        rough = float(rng.choice([0.0, 0.02, 0.05, 0.08]))
+        pieces, gap = _pieces(rng, kind, width, rough, 2.8 if long else 1.4 if large else 1.0)
         there = placed(rng, pieces, view)
         if there is None:
             continue
+        there = [shaded(each, view) for each in there]
         light = light_of(rng, view)
         clean = without_noise(there, view, light)
         apart = np.inf

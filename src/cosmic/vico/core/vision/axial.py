@@ -8,21 +8,25 @@ unevenness, so that a rough fibre is not taken to pieces.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import (
     binary_erosion,
     gaussian_filter1d,
+    label,
     maximum_filter1d,
+    maximum_position,
     median_filter,
+    minimum_filter1d,
     uniform_filter1d,
 )
 
 from cosmic.vico.core.vision.grey import Floats, Floats32, middle
 from cosmic.vico.core.vision.profiles import Flags, Scene, sample
-from cosmic.vico.core.vision.refine import Course
+from cosmic.vico.core.vision.refine import STEP_PX, Course
 from cosmic.vico.core.vision.smoothing import arc_lengths, directions, resampled
 
 GAP = "the ground shines through in one place: it may be two fibres end to end"
@@ -34,15 +38,19 @@ STEP = "its width, contrast or course changes in one step: it may be two fibres 
 TIMES = 6.5
 # Shares of the fibre's contrast, or of its width, below which nothing is a sign.
 DIP, NOTCH, BUMP = 0.1, 0.12, 0.3
+# Of its contrast, from which a gap parts a fibre in two.
+BREAK = 0.35
 CONTRAST_STEP, WIDTH_STEP = 0.12, 0.1
 SIDE_STEP, SIDE_STEP_PX = 0.04, 0.4
 SWELLING = 0.1
 # Radians turned within a width.
 TURN = 0.15
-# All signs in one place, of which each is the root of the sum of squares of so many.
-TOGETHER = 2.0
 # What is less than this part of where a sign begins is none in the smoothest fibre.
 WITH_OTHERS = 0.4
+# As long as this a speck of dust may be.
+DUST_PX = 12
+# So many widths beside what crosses a fibre its shade may lie.
+SHADE = 1.0
 # Narrower, a gap alone is a sign; below THIN_PX a lumen, a speck on it and an overlap look alike,
 # so that the rest counts less.
 LEAST_WIDTH_PX, THIN_PX, THIN = 4.0, 7.5, 0.75
@@ -50,47 +58,48 @@ LEAST_WIDTH_PX, THIN_PX, THIN = 4.0, 7.5, 0.75
 MANY = 3.2
 
 
-@dataclass(frozen=True, slots=True)
+NAMES: Final = (
+    "gap", "waist", "notch", "doubled", "swollen", "kinked", "darkness", "width", "aside",
+)  # fmt: skip
+"""Signs along a fibre.
+
+gap, waist, notch: the ground shines through the middle, over the whole width, or at one side;
+doubled: a stretch takes more light away; swollen: in one place the fibre is wider, or takes more
+light away; kinked: it turns more within a width than before and after; darkness, width, aside:
+steps of contrast, of width and of the centre line.
+"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Joints:
-    """Signs along a fibre, each as a multiple of where it begins to count.
+    """Signs along a fibre, in the order of `NAMES`.
 
     Attributes
     ----------
-    gap, waist, notch : float
-        The ground shines through the middle, over the whole width, or at one side.
-    doubled : float
-        A stretch takes more light away.
-    darkness, width, aside : float
-        Steps of contrast, of width and of the centre line.
-    swollen : float
-        In one place the fibre is wider, or takes more light away.
-    kinked : float
-        It turns more within a width than before and after.
-    together : float
-        All of these in one place.
+    clearest : ndarray, shape (signs,)
+        The clearest of each sign, as a multiple of where it counts by itself.
+    along : ndarray, shape (signs, n)
+        How clear each is within half a width of each point, as a multiple of where it counts with
+        others in its place.
     checked : bool
         Whether enough of it is seen to tell.
+    breaks_px : ndarray
+        How far along it the ground shows where it may end and another begin.
     """
 
-    gap: float = 0.0
-    waist: float = 0.0
-    notch: float = 0.0
-    doubled: float = 0.0
-    darkness: float = 0.0
-    width: float = 0.0
-    aside: float = 0.0
-    swollen: float = 0.0
-    kinked: float = 0.0
-    together: float = 0.0
+    clearest: Floats = field(default_factory=lambda: np.zeros(len(NAMES)))
+    along: Floats = field(default_factory=lambda: np.zeros((len(NAMES), 1)))
     checked: bool = True
+    breaks_px: Floats = field(default_factory=lambda: np.zeros(0))
 
     @property
     def doubts(self) -> list[str]:
-        """Reasons that count."""
-        found = [GAP] if max(self.gap, self.waist, self.notch) > 1.0 else []
-        if self.doubled > 1.0:
+        """Reasons that count by themselves."""
+        clear = dict(zip(NAMES, self.clearest > 1.0, strict=True))
+        found = [GAP] if clear["gap"] or clear["waist"] or clear["notch"] else []
+        if clear["doubled"]:
             found.append(DOUBLED)
-        if max(self.darkness, self.width, self.aside, self.kinked) > 1.0:
+        if clear["darkness"] or clear["width"] or clear["aside"] or clear["kinked"]:
             found.append(STEP)
         return found
 
@@ -100,8 +109,9 @@ def joints(scene: Scene, course: Course) -> Joints:
     line = resampled(course.line, 1.0)
     blur = max(1.0, min(course.blur_px, 0.4 * course.width))
     seen = _seen(course, course.good, line, blur)
-    # Where the ground shines through, no edges are seen.
-    free = _seen(course, course.free, line, blur)
+    # Where the ground shines through, no edges are seen. What crosses casts a shade beside it.
+    free = _seen(course, _around(course.free, SHADE * course.width / STEP_PX), line, blur)
+    seen &= free
     if seen.sum() < 6.0 * course.width:
         return Joints(checked=False)
     height, across = _heights(scene, course, line, blur)
@@ -116,35 +126,46 @@ def joints(scene: Scene, course: Course) -> Joints:
     side = parts.astype(np.float64) / course.width
     window = 2 * int(3.0 * course.width) + 1
     fine = [_uneven(values, blur, window) for values in (inner, mass)]
-    gap, waist = (_beyond(-values, seen, free, DIP) for values in fine)
+    signs = [_beyond(-values, seen, free, DIP) for values in fine]
+    breaks = _breaks(-fine[0], signs[0][0] > 1.0)
     if course.width < LEAST_WIDTH_PX:
-        return Joints(_most(gap), _most(waist))
-    notches = [_notch(height, across, (seen, free), course.width, blur, part) for part in (-1, 1)]
+        signs += [np.zeros_like(signs[0])] * (len(NAMES) - len(signs))
+        return _joints(signs, course.width, breaks)
+    part = THIN if course.width < THIN_PX else 1.0
+    notches = [_notch(height, across, (seen, free), course.width, blur, turn) for turn in (-1, 1)]
+    # Dust beside a fibre is no step: it comes and goes within a width.
+    size = 2 * max(int(course.width), DUST_PX) + 1
+    level, weight, side = (
+        median_filter(each, size, mode="nearest") for each in (inner, mass, side)
+    )
     steps = (
-        (inner, CONTRAST_STEP),
-        (mass, WIDTH_STEP),
+        (level, CONTRAST_STEP),
+        (weight, WIDTH_STEP),
         (side, max(SIDE_STEP, SIDE_STEP_PX / course.width)),
     )
-    stepped = [_stepped(values, seen, course.width, blur, least) for values, least in steps]
-    doubled = _beyond(fine[0], seen, seen, BUMP)
-    swollen = _beyond(fine[1], seen, seen, SWELLING)
-    kinked = _kinked(line, side * course.width, seen, course.width, blur)
-    part = THIN if course.width < THIN_PX else 1.0
-    signs = (gap, waist, *notches, doubled, swollen, kinked, *stepped)
-    notch = max(_most(each) for each in notches)
-    darkness, width, aside = (part * _most(each) for each in stepped)
-    return Joints(
-        _most(gap),
-        _most(waist),
-        part * notch,
-        part * _most(doubled),
-        darkness,
-        width,
-        aside,
-        part * _most(swollen),
-        part * _most(kinked),
-        part * _together(signs, course.width),
-    )
+    others = [
+        np.maximum(*notches),
+        _beyond(fine[0], seen, seen, BUMP),
+        _beyond(fine[1], seen, seen, SWELLING),
+        _kinked(line, side * course.width, seen, course.width, blur),
+        *(_stepped(values, seen, course.width, blur, least) for values, least in steps),
+    ]
+    return _joints([*signs, *(part * each for each in others)], course.width, breaks)
+
+
+def _breaks(dip: Floats, clear: Flags) -> Floats:
+    """Return the deepest point of each place at which a fibre is broken."""
+    labels, count = label(clear & (dip > BREAK))
+    at = maximum_position(dip, labels, range(1, count + 1)) if count else []
+    return np.array(at, dtype=np.float64).ravel()
+
+
+def _joints(signs: Sequence[Floats], width: float, breaks_px: Floats) -> Joints:
+    """Return signs, which are near each other where they lie within half a width."""
+    reach = 2 * int(0.5 * width) + 1
+    near = [maximum_filter1d(np.maximum(each[1], 0.0), reach, mode="nearest") for each in signs]
+    clearest = np.array([float(each[0].max()) for each in signs])
+    return Joints(clearest, np.array(near), breaks_px=breaks_px)
 
 
 def _seen(course: Course, flags: Flags, line: Floats, blur: float) -> Flags:
@@ -155,6 +176,12 @@ def _seen(course: Course, flags: Flags, line: Floats, blur: float) -> Flags:
     skip = int(np.ceil(0.75 * course.width + 3.0 * blur))
     good[:skip] = good[-skip:] = False
     return np.asarray(good, dtype=np.bool_)
+
+
+def _around(flags: Flags, reach: float) -> Flags:
+    """Return the points with a flag up to some points before and after, beyond the ends too."""
+    size = 2 * int(reach) + 1
+    return np.asarray(minimum_filter1d(flags.astype(np.uint8), size, mode="nearest") > 0)
 
 
 def _heights(
@@ -223,17 +250,6 @@ def _kinked(line: Floats, aside_px: Floats, seen: Flags, width: float, blur: flo
 def _beyond(values: Floats, seen: Flags, where: Flags, least: float) -> Floats:
     """Return how far something stands out at each point from a fibre's own unevenness."""
     return np.where(where | seen, values / _limits(values[seen], least), 0.0)
-
-
-def _most(values: Floats) -> float:
-    return float(values[0].max())
-
-
-def _together(signs: Sequence[Floats], width: float) -> float:
-    """Return how clear all signs are that lie within a width of each other."""
-    reach = 2 * int(0.5 * width) + 1
-    near = [maximum_filter1d(np.maximum(each[1], 0.0), reach, mode="nearest") for each in signs]
-    return float(np.sqrt(np.square(near).sum(axis=0).max())) / TOGETHER
 
 
 def _limits(values: Floats, least: float) -> Floats:

@@ -11,10 +11,12 @@ from dataclasses import dataclass, field
 from math import exp, log
 from typing import Final
 
+import numpy as np
+
 from cosmic.vico.core.vision import axial, beyond
 from cosmic.vico.core.vision.axial import Joints
 from cosmic.vico.core.vision.ends import EndKind
-from cosmic.vico.core.vision.grey import Mask
+from cosmic.vico.core.vision.grey import Floats, Mask
 from cosmic.vico.core.vision.joining import ON_ANOTHER
 from cosmic.vico.core.vision.profiles import Scene
 from cosmic.vico.core.vision.refine import Course
@@ -22,25 +24,20 @@ from cosmic.vico.core.vision.refine import Course
 CERTAIN: Final = 0.999
 IMPROBABLE: Final = "weak signs together make it less than certain that it is one whole fibre"
 
-NAMES: Final = (
-    "gap", "waist", "notch", "doubled", "darkness", "width", "aside", "swollen", "kinked",
-    "together", "goes on", "soft",
-)  # fmt: skip
-WEIGHTS: Final = (2.5, 1.0, 5.6, 0.0, 1.2, 3.2, 0.0, 1.9, 7.9, 3.8, 5.0, 5.0)
-"""Fitted; that of waist, of which a clear one is a doubt by itself, is a floor."""
-FITTED_LOGIT: Final = 9.98
+NAMES: Final = (*axial.NAMES, "goes on", "soft")
+WEIGHTS: Final = (2.0, 1.7, 2.9, 0.4, 1.6, 4.6, 2.0, 1.7, 0.1, 1.5, 2.6)
+"""Fitted to 998 fibres and pairs; a tenth is a floor."""
+FITTED_LOGIT: Final = 10.11
 """Logit of the probability where there is no sign, on images of which a half is no single fibre."""
 FITTED_ODDS: Final = 1.45
 PRIOR_ODDS: Final = 99.0
 """Whole fibres for each that is two or a part, among what is found: a guess."""
 ALONE: Final = FITTED_LOGIT + log(PRIOR_ODDS / FITTED_ODDS)
 DOUBT: Final = 6.0
-"""What each other reason to doubt takes off: a guess."""
-STEEPNESS: Final = 2
-"""A sign half as clear as one that counts by itself weighs so many powers of two less."""
-
+"""What each reason to doubt takes off: a guess."""
+MOST_ALONG: Final = 4.0
 MOST: Final = 1.5
-INTERVAL_STDS: Final = 2.2
+INTERVAL_STDS: Final = 2.0
 """Within so many standard deviations lie 95 of 100 lengths of drawn single fibres."""
 CUT_OFF: Final = frozenset(
     {EndKind.BORDER.value, EndKind.BODY.value, EndKind.LOST.value, ON_ANOTHER}
@@ -68,13 +65,19 @@ class Signs:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """Each sign in the order of `NAMES`, from nothing to `MOST`."""
-        j = self.joints
-        along = (
-            j.gap, j.waist, j.notch, j.doubled, j.darkness, j.width, j.aside, j.swollen, j.kinked,
-            j.together,
-        )  # fmt: skip
-        return tuple(min(max(each, 0.0), MOST) for each in (*along, self.goes_on, self.soft))
+        """Each sign in the order of `NAMES`, from nothing to `MOST`, where they weigh most."""
+        return tuple(self.weighed_by(WEIGHTS).tolist())
+
+    def weighed_by(self, weights: Sequence[float]) -> Floats:
+        """Return each sign in the order of `NAMES`.
+
+        Those along the fibre are of the one place where together they weigh most: a joint is in
+        one place, the unevenness of one fibre is scattered.
+        """
+        along = np.minimum(self.joints.along, MOST_ALONG)
+        place = int(np.argmax(np.asarray(weights[: len(along)]) @ along))
+        ends = np.clip([self.goes_on, self.soft], 0.0, MOST)
+        return np.concatenate([along[:, place], ends])
 
 
 def signs_of(scene: Scene, course: Course, explained: Mask) -> Signs:
@@ -90,11 +93,8 @@ def probability(signs: Signs, doubts: Sequence[str]) -> float:
     """Return how probable it is that something is one whole fibre."""
     if not CUT_OFF.isdisjoint(doubts):
         return 0.0
-    others = len(set(doubts) - set(signs.doubts))
-    taken = sum(
-        weight * value**STEEPNESS for weight, value in zip(WEIGHTS, signs.values, strict=True)
-    )
-    return 1.0 / (1.0 + exp(taken + DOUBT * others - ALONE))
+    taken = sum(weight * value for weight, value in zip(WEIGHTS, signs.values, strict=True))
+    return 1.0 / (1.0 + exp(taken + DOUBT * len({*doubts, *signs.doubts}) - ALONE))
 
 
 def interval(length: float, std: float) -> tuple[float, float]:

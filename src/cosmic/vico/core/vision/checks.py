@@ -31,9 +31,9 @@ SHARP = "it bends more sharply than its own width"
 class Limits:
     """When something is doubtful."""
 
-    blur_of_width: float = 0.22
+    blur_of_width: float = 0.5
     blur_px: float = 2.0
-    blur_most_px: float = 4.2
+    blur_most_px: float = 4.4
     dip: float = 0.15
     edging: float = 0.1
     turn: float = 1.6

@@ -5,7 +5,6 @@ from types import MappingProxyType
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.vision import axial, certainty, checks
@@ -20,8 +19,9 @@ from cosmic.vico.core.vision.measures import (
     kink_index,
     longest_extent,
 )
+from cosmic.vico.core.vision.parting import parted_at_gaps, separated
 from cosmic.vico.core.vision.profiles import Scene
-from cosmic.vico.core.vision.refine import Course, Neighbours, near_ends, refine
+from cosmic.vico.core.vision.refine import Course, near_ends, neighbours_of, refine
 from cosmic.vico.core.vision.relief import find_relief, level_step
 from cosmic.vico.core.vision.section import (
     APERTURE_PX,
@@ -96,13 +96,18 @@ def _found(pixels: Pixels) -> list[Fibre]:
     least = max(LEAST_PX, LEAST_OF_IMAGE * float(np.hypot(*pixels.shape)))
     kept = [each for each in strands(graph) if long_enough(each, relief.factor, least)]
     kept.sort(key=lambda each: -float(arc_lengths(each.points)[-1]))
-    courses = []
     crowd = len(kept) > MOST_STRANDS
     kept = kept[:MOST_STRANDS]
-    for index, strand in enumerate(kept):
-        course = refine(scene, strand, neighbours(scene, kept, index))
-        if course is not None and slender(course, least):
-            courses.append((strand, course))
+    found = [
+        refine(scene, each, neighbours_of(scene, kept, index)) for index, each in enumerate(kept)
+    ]
+    kept, found = parted_at_gaps(scene, kept, found)
+    kept, found = separated(scene, kept, found, least)
+    courses = [
+        (strand, course)
+        for strand, course in zip(kept, found, strict=True)
+        if course is not None and slender(course, least)
+    ]
     return checked_fibres(scene, courses, crowd=crowd)
 
 
@@ -119,25 +124,6 @@ def slender(course: Course, least: float) -> bool:
     typical = float(np.median(course.contrast[course.good])) if course.good.any() else 0.0
     long = length >= max(least, SLENDER * course.width)
     return long and typical > 0 and checks.edging(course, typical) < 0.5
-
-
-def neighbours(scene: Scene, kept: list[Strand], index: int) -> Neighbours:
-    """Return all strands but one."""
-    own = kept[index].points
-    reach = 3.0 * kept[index].half_width + 12.0
-    low, high = own.min(axis=0) - reach, own.max(axis=0) + reach
-    others = []
-    for n, each in enumerate(kept):
-        inside = ((each.points > low) & (each.points < high)).all(axis=1)
-        if n != index and inside.any():
-            others.append((each, scene.full(each.points[inside])))
-    if not others:
-        return Neighbours(None, np.zeros(0))
-    points = np.concatenate([line for _, line in others])
-    margins = np.concatenate(
-        [np.full(len(line), each.half_width * scene.factor) for each, line in others]
-    )
-    return Neighbours(cKDTree(points), margins)
 
 
 def section_of(scene: Scene, course: Course) -> Section:

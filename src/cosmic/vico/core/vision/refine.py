@@ -71,6 +71,25 @@ class Neighbours:
         return np.asarray(distance < 0.5 * width + self.margins[index] + 1.5)
 
 
+def neighbours_of(scene: Scene, kept: list[Strand], index: int) -> Neighbours:
+    """Return all strands but one, as far as they come near it."""
+    own = kept[index].points
+    reach = 3.0 * kept[index].half_width + 12.0
+    low, high = own.min(axis=0) - reach, own.max(axis=0) + reach
+    others = []
+    for n, each in enumerate(kept):
+        inside = ((each.points > low) & (each.points < high)).all(axis=1)
+        if n != index and inside.any():
+            others.append((each, scene.full(each.points[inside])))
+    if not others:
+        return Neighbours(None, np.zeros(0))
+    points = np.concatenate([line for _, line in others])
+    margins = np.concatenate(
+        [np.full(len(line), each.half_width * scene.factor) for each, line in others]
+    )
+    return Neighbours(cKDTree(points), margins)
+
+
 def refine(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | None:
     """Return the exact course of a strand, or None where there is no fibre after all."""
     try:
@@ -167,7 +186,8 @@ def measure(scene: Scene, course: Course, neighbours: Neighbours) -> bool:
         return False
     edges = find_edges(profiles, height, free, course.width)
     widths = edges.right - edges.left
-    good = free & np.isfinite(widths)
+    # In noise an edge may be found beyond the other one.
+    good = free & (widths > 0.0)
     if good.sum() < 4:
         return False
     take(course, edges, widths, good, profiles)
