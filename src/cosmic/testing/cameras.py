@@ -85,6 +85,7 @@ class CameraContract:
     def test_a_frame_has_the_shape_of_its_settings(self, camera: Camera) -> None:
         camera.start()
         (frame,) = self.frames(camera, 1)
+        assert frame.size_px == (camera.settings.roi.width_px, camera.settings.roi.height_px)
         assert frame.data.shape[:2] == (camera.settings.roi.height_px, camera.settings.roi.width_px)
         assert frame.pixel_format is camera.settings.pixel_format
 

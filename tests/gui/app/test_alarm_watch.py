@@ -52,6 +52,23 @@ def test_each_level_is_raised_once_and_ends_when_it_is_better_by_some_share() ->
     assert len(bench.at(81.0)) == 3
 
 
+def test_what_costs_time_to_read_is_read_seldom_and_its_rate_is_right() -> None:
+    book, reads, now_s = AlarmBook(), list[float](), [0.0]
+    watch = AlarmWatch(book, now_s=lambda: now_s[0])
+
+    def read() -> float:
+        reads.append(now_s[0])
+        return 10.0 * now_s[0]
+
+    levels = RisingLevels(rate_warning=11.0)
+    slow = Quantity("disk", "The room", "GB", levels, "Free some", read, every_s=5.0)
+    for _ in range(22):
+        now_s[0] += 0.5
+        watch.look({"disk": slow})
+    assert reads == [0.5, 5.5, 10.5]
+    assert book.alarms == ()  # 10 a second, whenever it is read
+
+
 def test_what_is_bad_when_small_raises_on_its_way_down() -> None:
     bench = Bench(FallingLevels(warning=5.0, critical=1.0))
     assert bench.at(6.0) == []

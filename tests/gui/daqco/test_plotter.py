@@ -380,6 +380,16 @@ def test_the_image_follows_by_itself(qtbot, plotter, port):
     qtbot.waitUntil(lambda: "#56B4E9" in colours(plotter), timeout=2000)
 
 
+def test_a_plot_that_nobody_sees_paints_nothing_and_has_all_when_it_is_seen(qtbot, plotter, port):
+    plotter.hide()
+    before = plotter.chart.raster.painted
+    acquire(port, [0.5, 1.0])
+    qtbot.wait(120)
+    assert plotter.chart.raster.painted == before
+    plotter.show()
+    assert plotter.chart.now_view().end == 1000
+
+
 def test_an_exception_while_painting_is_logged_once_and_harms_nobody(qtbot, plotter, caplog):
     plotter.chart.strip.raster = None
     for _ in range(3):

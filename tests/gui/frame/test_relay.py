@@ -98,6 +98,19 @@ def test_what_has_a_value_is_heard_each_time_and_in_order(qtbot, event):
     relay.end()
 
 
+def test_a_relay_that_rests_calls_at_once_then_seldom_and_never_misses_the_last(qtbot):
+    widget = Shown()
+    qtbot.addWidget(widget)
+    relay = Relay(widget.hear, least_ms=60)
+    for number in range(5):
+        relay(number)
+    assert [values for values, _ in widget.heard] == [(0,)]
+    qtbot.waitUntil(lambda: len(widget.heard) == 2)
+    assert widget.heard[-1][0] == (4,)
+    qtbot.wait(80)
+    assert len(widget.heard) == 2
+
+
 def test_it_stops_listening_when_the_widget_goes_and_when_it_is_ended(qapp, event):
     kept = []
     widget = Shown()

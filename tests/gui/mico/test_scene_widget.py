@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QApplication, QLabel, QToolButton
+from PySide6.QtWidgets import QApplication, QLabel, QToolButton, QWidget
 
 from cosmic.frame.gui.theme import apply_theme
 from cosmic.mico.core.collision.answer import Approach
@@ -98,6 +98,38 @@ def test_it_paints_only_when_a_body_moved(scene):
     assert settled_frames(scene) == painted
     scene.set_positions({"left.x": 11.0})
     assert settled_frames(scene) == painted + 1
+
+
+def test_a_repaint_draws_no_body_anew(scene):
+    scene.set_positions({"left.x": 10.0})
+    drawn, before = settled_frames(scene), picture(scene)
+    scene.view.repaint()
+    scene.set_nearest(NEAR)
+    scene.set_nearest(None)
+    assert settled_frames(scene) == drawn
+    assert (picture(scene) == before).all()
+    scene.resize(600, 420)
+    assert settled_frames(scene) == drawn + 1
+
+
+def test_what_lies_below_the_scene_does_not_have_it_painted(qtbot):
+    below = QWidget()
+    qtbot.addWidget(below)
+    below.resize(760, 560)
+    scene = SceneWidget(below)
+    scene.set_model(two_arms())
+    scene.setGeometry(20, 20, 700, 500)
+    below.show()
+    qtbot.waitExposed(below)
+    QApplication.processEvents()
+    painted = []
+    scene.view.draw_hovered = lambda *_: painted.append("anew")
+    below.update()
+    QApplication.processEvents()
+    assert painted == []
+    scene.view.update()
+    QApplication.processEvents()
+    assert painted == ["anew"]
 
 
 def test_an_axis_that_is_not_named_or_not_known_stays_where_it_was(scene):

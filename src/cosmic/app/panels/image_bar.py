@@ -66,7 +66,8 @@ class ImageBar(QWidget):
     def __init__(self, vico: Vico, exposures: dict[str, QWidget]) -> None:
         super().__init__()
         self.setObjectName("imageBar")
-        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        # Opaque, so that an image below it does not have the bar and its buttons painted anew.
+        self.setAutoFillBackground(True)
         self._vico = vico
         self._light_given: float | None = None
         self._make_camera(list(exposures))

@@ -19,6 +19,8 @@ HYSTERESIS: Final = 0.05
 SOUND_S: Final = 3.0
 """So often a sound is repeated while a critical alarm lasts that nobody acknowledged."""
 RATE_OVER_S: Final = 1.0
+COMPUTER_S: Final = 5.0
+"""So often load, memory, temperature and disk are read."""
 _THERMAL: Final = Path("/sys/class/thermal")
 _MEMORY: Final = Path("/proc/meminfo")
 
@@ -41,6 +43,8 @@ class Quantity:
         Returns it now; None where nobody knows.
     scale : float
         Shown is the value times this.
+    every_s : float
+        It is looked at no more often: what is read from the system is read in the window's thread.
     """
 
     source: str
@@ -50,6 +54,7 @@ class Quantity:
     advice: str
     value: Callable[[], float | None]
     scale: float = 1.0
+    every_s: float = 0.0
 
     @property
     def falling(self) -> bool:
@@ -82,6 +87,7 @@ class AlarmWatch:
         self._levels: dict[str, Level | None] = {}
         self._before: dict[str, tuple[float, float]] = {}
         self._rates: dict[str, float] = {}
+        self._due_s: dict[str, float] = {}
         self._sounded_s = float("-inf")
 
     def look(self, quantities: Mapping[str, Quantity]) -> None:
@@ -89,8 +95,11 @@ class AlarmWatch:
         for source in self._levels.keys() - quantities.keys():
             self._book.end(source)
             del self._levels[source]
+        now_s = self._now_s()
         for each in quantities.values():
-            self._look_at(each)
+            if now_s >= self._due_s.get(each.source, now_s):
+                self._due_s[each.source] = now_s + each.every_s
+                self._look_at(each)
         self._make_sound()
 
     def _look_at(self, quantity: Quantity) -> None:
@@ -214,6 +223,7 @@ def computer_quantities(settings: AlarmSettings, folder: Path) -> dict[str, Quan
             settings.processor,
             "End other programs: the window may answer late",
             processor_load,
+            every_s=COMPUTER_S,
         ),
         Quantity(
             "memory",
@@ -223,6 +233,7 @@ def computer_quantities(settings: AlarmSettings, folder: Path) -> dict[str, Quan
             "End other programs, then restart this one",
             memory_share,
             scale=100.0,
+            every_s=COMPUTER_S,
         ),
         Quantity(
             "temperature",
@@ -231,6 +242,7 @@ def computer_quantities(settings: AlarmSettings, folder: Path) -> dict[str, Quan
             settings.temperature_degc,
             "Clear its fans and openings",
             temperature_degc,
+            every_s=COMPUTER_S,
         ),
         Quantity(
             "disk",
@@ -239,6 +251,7 @@ def computer_quantities(settings: AlarmSettings, folder: Path) -> dict[str, Quan
             settings.disk_gb,
             disk,
             lambda: disk_left_gb(folder),
+            every_s=COMPUTER_S,
         ),
     )
     return {each.source: each for each in found}

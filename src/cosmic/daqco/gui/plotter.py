@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QVBoxLayout, QWidget
 
 from cosmic.daqco.api.daqco import Daqco
@@ -29,6 +30,7 @@ from cosmic.frame.gui.theme import STEP_PX, number_font
 from cosmic.frame.overrides import override
 
 READOUT_MS: Final = 200
+UNSEEN_MS: Final = 1000
 OLD_S: Final = 1.0
 """A value that is older is not the present one."""
 MEAN_S: Final = 0.2
@@ -73,7 +75,6 @@ class UDaqPlotter(QWidget):
         self._relay = Relay(self._on_changed).follow(daqco.on_change)
         self._relay.keep(daqco.follow(self.inbox.put))
         self._on_changed()
-        self._readout.start()
 
     def _build(self) -> None:
         self.window_text.setFont(number_font())
@@ -123,6 +124,27 @@ class UDaqPlotter(QWidget):
         if self.split.orientation() is not upright:
             self.split.setOrientation(upright)
             self._share_room()
+
+    def _set_pace(self) -> None:
+        """Look as often as the screen shows it; unseen, only keep the history."""
+        seen = self.isVisible()
+        self._timer.start(max(1, round(1000.0 / self.refresh_hz)) if seen else UNSEEN_MS)
+        if seen and not self._readout.isActive():
+            self._readout.start()
+        elif not seen:
+            self._readout.stop()
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self._set_pace()
+        self.refresh()
+        self.read_out()
+
+    @override
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        self._set_pace()
 
     # What the operator does
 
@@ -210,7 +232,7 @@ class UDaqPlotter(QWidget):
             self._begin(key)
         else:
             self._set_traces(self._traces_of(active))
-        self._timer.start(max(1, round(1000.0 / self.refresh_hz)))
+        self._set_pace()
         units = {trace.name: trace.unit for trace in self.chart.traces}
         self.banner.show_limits(self._daqco.limits, units)
         self.problem.set_text(self._daqco.problem)

@@ -42,6 +42,12 @@ def tipped(widget: W, tip: str) -> W:
     return widget
 
 
+def retip(widget: QWidget, tip: str) -> None:
+    """Give `widget` another tooltip; the one that it has costs nothing, where Qt sends an event."""
+    if widget.toolTip() != tip:
+        widget.setToolTip(tip)
+
+
 def push_button(text: str, tip: str) -> QPushButton:
     """Return a button that says what it does."""
     return tipped(QPushButton(text), tip)

@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QEnterEvent, QFocusEvent, QKeyEvent, QPainter,
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QWidget
 
 from cosmic.frame.errors import QuantityError
-from cosmic.frame.gui.build import restyle
+from cosmic.frame.gui.build import restyle, retip
 from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.reason_bubble import ReasonBubble
 from cosmic.frame.gui.theme import STEP_PX, State, current_palette, number_font, state_look
@@ -188,12 +188,12 @@ class QuantityField(QLineEdit):
     def _show_tip(self) -> None:
         self.setAccessibleDescription(self._reason)
         if self._reason:
-            self.setToolTip(f"REFUSED: {self._reason}\nEsc goes back to the last good value")
+            retip(self, f"REFUSED: {self._reason}\nEsc goes back to the last good value")
             return
         parts = [self._name or "Number", f"in {DISPLAY[self._unit]}"]
         if self._low is not None and self._high is not None:
             parts.append(f"({self._with_unit(self._low)} to {self._with_unit(self._high)})")
-        self.setToolTip(f"{' '.join(parts)}; Enter accepts, Esc goes back")
+        retip(self, f"{' '.join(parts)}; Enter accepts, Esc goes back")
 
     def _on_text_edited(self) -> None:
         self._before_commit = None

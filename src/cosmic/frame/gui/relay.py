@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Generic, Self, TypeVarTuple
 from weakref import WeakMethod
 
-from PySide6.QtCore import QObject, Qt, QThread, Signal
+from PySide6.QtCore import QObject, Qt, QThread, QTimer, Signal
 from shiboken6 import isValid
 
 from cosmic.frame.events import Unsubscribe
@@ -28,11 +28,15 @@ class Relay(QObject, Generic[*Ts]):
         What is called, with the arguments that the relay was called with.
     queued : bool
         In the GUI thread too it is called by the event loop, after what was sent before.
+    least_ms : int
+        It is called no more often: of calls that come sooner the last one is made afterwards.
     """
 
     _called = Signal(object)
 
-    def __init__(self, receiver: Callable[[*Ts], object], *, queued: bool = False) -> None:
+    def __init__(
+        self, receiver: Callable[[*Ts], object], *, queued: bool = False, least_ms: int = 0
+    ) -> None:
         super().__init__()
         owner = getattr(receiver, "__self__", None)
         if not isinstance(owner, QObject):
@@ -41,6 +45,11 @@ class Relay(QObject, Generic[*Ts]):
         self._ends: list[Unsubscribe] = []
         self._queued = queued
         self._arriving = False
+        self._later: tuple[*Ts] | None = None
+        self._rest: QTimer | None = None
+        if least_ms:
+            self._rest = QTimer(self, interval=least_ms, singleShot=True)
+            self._rest.timeout.connect(self._on_rested)
         owner.destroyed.connect(_ender(self._ends))
         kind = Qt.ConnectionType
         self._called.connect(
@@ -71,6 +80,19 @@ class Relay(QObject, Generic[*Ts]):
     def _on_called(self, args: tuple[*Ts]) -> None:
         if not args:
             self._arriving = False  # before it looks, so that no change is missed
+        if self._rest is not None:
+            if self._rest.isActive():
+                self._later = args
+                return
+            self._rest.start()
+        self._deliver(args)
+
+    def _on_rested(self) -> None:
+        args, self._later = self._later, None
+        if args is not None:
+            self._on_called(args)
+
+    def _deliver(self, args: tuple[*Ts]) -> None:
         receiver = self._receiver()
         if receiver is not None and isValid(getattr(receiver, "__self__", None)):
             receiver(*args)

@@ -193,7 +193,6 @@ QProgressBar[look="bar"] { min-height: 8px; border: none; }
 #drawerBody { background: $panel; border-top: 2px solid $accent; }
 #stage { background: $field; }
 #stageInset { background: $panel; border: 1px solid $border_strong; }
-#imageBar { background: $panel; border-radius: 4px; }
 #coach { background: $raised; border: 1px solid $border; border-radius: 4px; }
 #operationCard { background: $raised; border: 1px solid $border_strong; border-radius: 4px; }
 #padButton { padding: 0px; min-width: 30px; max-width: 46px; min-height: 26px; }

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
 from typing import Final, TypeGuard
 
 from PySide6.QtCore import QCoreApplication
@@ -85,10 +86,16 @@ def state_look(state: State, palette: Palette | None = None) -> StateLook:
     return StateLook(colour=colour, glyph=glyph, word=state.value, fill=fill, text=palette.text)
 
 
+@cache
+def _families() -> list[str]:
+    """Return those of our families that this computer has: to list all takes a millisecond."""
+    known = set(QFontDatabase.families())
+    return [family for family in _FAMILIES if family in known] or ["sans-serif"]
+
+
 def ui_font(size_px: int = FONT_PX, *, bold: bool = False) -> QFont:
     """Return the font of the user interface; needs a QApplication."""
-    known = set(QFontDatabase.families())
-    font = QFont([family for family in _FAMILIES if family in known] or ["sans-serif"])
+    font = QFont(_families())
     font.setPixelSize(size_px)
     font.setBold(bold)
     return font

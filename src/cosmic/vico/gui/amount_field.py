@@ -8,6 +8,7 @@ from PySide6.QtGui import QFocusEvent, QKeyEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from cosmic.frame.errors import QuantityError
+from cosmic.frame.gui.build import retip
 from cosmic.frame.gui.number_edit import NumberEdit, read_number
 from cosmic.frame.overrides import override
 from cosmic.vico.gui.texts import number_text, plain_steps
@@ -144,15 +145,15 @@ class AmountField(NumberEdit):
 
     def _show_tip(self) -> None:
         if self._why_not:
-            self.setToolTip(self._why_not)
+            retip(self, self._why_not)
             return
         if self.reason:
-            self.setToolTip(f"REFUSED: {self.reason}\nEsc goes back to the last good value")
+            retip(self, f"REFUSED: {self.reason}\nEsc goes back to the last good value")
             return
         span = ""
         if math.isfinite(self._low) and math.isfinite(self._high):
             span = f", {number_text(self._low)} to {self._with_unit(self._high)}"
-        self.setToolTip(f"{self._name}{span}; Enter accepts, Esc goes back")
+        retip(self, f"{self._name}{span}; Enter accepts, Esc goes back")
 
     def _go(self, steps: int) -> None:
         if self._good is None:

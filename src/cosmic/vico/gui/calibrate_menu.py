@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.amounts import duration_text
-from cosmic.frame.gui.build import named, styled, tipped
+from cosmic.frame.gui.build import named, retip, styled, tipped
 from cosmic.frame.gui.task_watch import TaskWatch
 from cosmic.frame.gui.theme import State, state_look
 from cosmic.frame.operation import Progress, Task
@@ -39,6 +39,7 @@ class CalibrateButton(QToolButton):
     ) -> None:
         super().__init__(parent)
         self._camera, self._now = camera, now
+        self._filled: object = None
         self._watch = TaskWatch(self)
         self._watch.progressed.connect(self._on_progressed)
         self.setText("Calibrate")
@@ -56,13 +57,17 @@ class CalibrateButton(QToolButton):
         menu = self.menu()
         if menu.isVisible():
             return
+        tools, lines = tuple(self._camera.targets), self.lines()
+        wanted = (self._watch.busy, tools, lines)
+        if wanted == self._filled:
+            return  # a menu made anew sends more events than the rest of the window
+        self._filled = wanted
         menu.clear()
-        tools = tuple(self._camera.targets)
         if self._watch.busy:
             menu.addAction("Cancel").triggered.connect(self._on_cancel)
             return
         self.setEnabled(bool(tools))
-        self.setToolTip(TIP if tools else "Not here: no tool can be moved from this window")
+        retip(self, TIP if tools else "Not here: no tool can be moved from this window")
         for tool in tools:
             action = menu.addAction(f"Move {tool}")
             action.setToolTip("Its tip must be in the image and in focus")
@@ -71,7 +76,7 @@ class CalibrateButton(QToolButton):
         action.setToolTip("Turns the table by 24° to both sides; a fibre must lie near the middle")
         action.triggered.connect(lambda _=False: self._begin_rotation())
         menu.addSeparator()
-        for text in self.lines() or ["not calibrated yet"]:
+        for text in lines or ["not calibrated yet"]:
             menu.addAction(text).setEnabled(False)
 
     def lines(self) -> list[str]:

@@ -134,7 +134,7 @@ class CameraView(QWidget):
         self._readout = QTimer(self, interval=READOUT_MS)
         self._build()
         self._connect()
-        self._relay = Relay(self.refresh).follow(vico.on_change)
+        self._relay = Relay(self.refresh, least_ms=READOUT_MS).follow(vico.on_change)
         self.refresh()
 
     @property

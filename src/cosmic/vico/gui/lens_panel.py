@@ -64,7 +64,7 @@ class LensPanel(QWidget):
         self._look = QTimer(self, interval=LOOK_MS)
         self._look.timeout.connect(self.refresh)
         self._look.start()
-        self._relay = Relay(self.refresh).follow(vico.on_change)
+        self._relay = Relay(self.refresh, least_ms=LOOK_MS).follow(vico.on_change)
         self.refresh()
 
     # Putting it together

@@ -75,6 +75,10 @@ class Histogram:
 def histogram(data: Pixels, full: int) -> Histogram:
     """Count the brightness of a part of the pixels, evenly spread."""
     step = max(1, int(np.sqrt(data.shape[0] * data.shape[1] / SAMPLES)))
+    if data.dtype == np.uint8 and data.ndim == 2 and full == BINS - 1:
+        shares = np.bincount(data[::step, ::step].ravel(), minlength=BINS)
+        shares = shares / max(1, shares.sum())
+        return Histogram(shares, full, float(shares[0]), float(shares[-1]))
     part = np.minimum(data[::step, ::step], full)
     bins = part.astype(np.uint32) * BINS // (full + 1)
     counts = np.bincount(bins.ravel(), minlength=BINS)[:BINS]

@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QPushButton, QWidget
 
 from cosmic.frame.errors import CosmicError
-from cosmic.frame.gui.build import push_button, tipped
+from cosmic.frame.gui.build import push_button, retip, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.task_watch import TaskWatch
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
@@ -99,8 +99,9 @@ class SettingsForm(QObject):
         for widget in (self.binning, self.pixel_format, self.trigger, self.full_sensor):
             widget.setEnabled(there)
         self.shoot.setEnabled(settings is not None and settings.trigger is Trigger.SOFTWARE)
-        self.shoot.setToolTip(
-            "Take one image now" if self.shoot.isEnabled() else "Choose the software trigger first"
+        retip(
+            self.shoot,
+            "Take one image now" if self.shoot.isEnabled() else "Choose the software trigger first",
         )
         if settings is None or ranges is None:
             for field in (self.exposure, self.gain, self.rate):
@@ -113,7 +114,7 @@ class SettingsForm(QObject):
         self._show_choices(settings, ranges)
         roi = settings.roi
         self.roi_text.setText(f"{roi.width_px} × {roi.height_px} px")
-        self.roi_text.setToolTip(f"from {roi.x_px}, {roi.y_px} px")
+        retip(self.roi_text, f"from {roi.x_px}, {roi.y_px} px")
 
     def _show_choices(self, settings: CameraSettings, ranges: CameraRanges) -> None:
         _choose(

@@ -6,6 +6,7 @@ from typing import Final
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSlider, QWidget
 
+from cosmic.frame.gui.build import retip
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.vico.gui.amount_field import AmountField
 
@@ -82,8 +83,8 @@ class SliderField(QWidget):
     def set_usable(self, why_not: str) -> None:
         """Disable both, with the reason in the tooltip; an empty reason enables them."""
         self.setEnabled(not why_not)
-        self.setToolTip(why_not)
-        self.slider.setToolTip(why_not or self._name)
+        retip(self, why_not)
+        retip(self.slider, why_not or self._name)
         self.field.set_usable(why_not)
 
     @property

@@ -6,7 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
-from cosmic.frame.gui.build import named, styled, tipped
+from cosmic.frame.gui.build import named, retip, styled, tipped
 from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.theme import STEP_PX
 
@@ -94,13 +94,13 @@ class ToolRow(QWidget):
     def show_running(self, running: bool, problem: str) -> None:
         """Show whether images are taken."""
         self.live.setChecked(running)
-        self.live.setToolTip("Stop the camera" if running else problem or "Start the camera")
+        retip(self.live, "Stop the camera" if running else problem or "Start the camera")
 
     def show_targets(self, targets: tuple[str, ...], problem: str) -> None:
         """Offer what can be moved; a problem disables the button and stands in its tooltip."""
         problem = problem or ("" if targets else "Nothing can be moved from here")
         self.go.setEnabled(not problem)
-        self.go.setToolTip(f"Not now: {problem}" if problem else MOVE_TIP)
+        retip(self.go, f"Not now: {problem}" if problem else MOVE_TIP)
         if tuple(action.text() for action in self.menu.actions()) != targets:
             self.menu.clear()
             for target in targets:

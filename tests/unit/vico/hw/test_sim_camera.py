@@ -10,8 +10,10 @@ import pytest
 
 from cosmic.frame.clock import ManualClock, RatedClock
 from cosmic.frame.errors import ConfigError, DeviceError, DeviceFault, NotConnectedError
+from cosmic.twin.optics.drawing import Drawing
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import shipped_settings
+from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.hw.interface import (
     CameraSettings,
     Frame,
@@ -20,7 +22,12 @@ from cosmic.vico.hw.interface import (
     Roi,
     Trigger,
 )
-from cosmic.vico.hw.sim_camera import BUFFERS, SimulatedCamera, SimulatedCameraLibrary
+from cosmic.vico.hw.sim_camera import (
+    BUFFERS,
+    DrawnFrame,
+    SimulatedCamera,
+    SimulatedCameraLibrary,
+)
 
 SMALL = Roi(640, 500, 160, 120)
 PERIOD_S = 1.0 / 15.0
@@ -136,6 +143,16 @@ def test_a_waiting_receiver_wakes_when_a_test_moves_the_time(stand: Stand) -> No
 
 
 # --- buffers and triggers -------------------------------------------------------------------------
+
+
+def test_the_size_of_a_frame_is_told_without_a_wait_for_its_pixels() -> None:
+    def draw() -> Drawing:
+        raise AssertionError("somebody waited for the pixels")
+
+    frame = DrawnFrame(draw, 1, 2.0, 2.0, size_px=(40, 30))
+    image = CameraImage("top", frame, Circumstances())
+    assert image.size_px == (40, 30)
+    assert not frame.ready
 
 
 def test_frames_that_nobody_receives_are_counted_and_not_drawn(stand: Stand) -> None:

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from PySide6.QtCore import QPointF
+from PySide6.QtGui import QPolygonF
 
 from cosmic.mico.core.collision.model import Floats
 from cosmic.mico.gui.scene.meshes import BodyMesh
@@ -49,13 +51,17 @@ class Outline:
 
     Attributes
     ----------
-    corners_mm : ndarray, shape (n, 2), mm
+    shape_mm : QPolygonF
+        Its corners in the plane, mm, where the body has not slid.
+    shift_mm : tuple of float
+        How far it has.
     farthest_mm, nearest_mm : float
         From where to where it reaches towards the eye.
     """
 
     body: str
-    corners_mm: Floats
+    shape_mm: QPolygonF
+    shift_mm: tuple[float, float]
     colour: tuple[float, float, float, float]
     farthest_mm: float
     nearest_mm: float
@@ -65,7 +71,7 @@ class Outlines:
     """Makes outlines; a body that did not turn since is only shifted."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple[str, int, Plane], tuple[bytes, Floats, float, float]] = {}
+        self._known: dict[tuple[str, int, Plane], tuple[bytes, QPolygonF, float, float]] = {}
 
     def clear(self) -> None:
         """Forget all bodies."""
@@ -74,7 +80,8 @@ class Outlines:
     def of(self, mesh: BodyMesh, pose: Floats, plane: Plane) -> list[Outline]:
         """Return the outlines of the shapes of a body at `pose` (mm) as seen along a plane."""
         towards = eye(plane)
-        shift, away = pose[list(plane[:2]), 3], towards * pose[plane[2], 3]
+        shift_mm = float(pose[plane[0], 3]), float(pose[plane[1], 3])
+        away = towards * pose[plane[2], 3]
         turn = pose[:3, :3]
         key = np.round(turn, 9).tobytes()
         found = []
@@ -84,8 +91,9 @@ class Outlines:
                 seen = part.vertices_mm @ turn.T
                 corners = hull(np.round(seen[:, list(plane[:2])], 6))
                 depth = towards * seen[:, plane[2]]
-                known = (key, corners, float(depth.min()), float(depth.max()))
+                shape = QPolygonF([QPointF(x, y) for x, y in corners.tolist()])
+                known = (key, shape, float(depth.min()), float(depth.max()))
                 self._known[mesh.body, number, plane] = known
             far, near = known[2] + away, known[3] + away
-            found.append(Outline(mesh.body, known[1] + shift, part.colour, far, near))
+            found.append(Outline(mesh.body, known[1], shift_mm, part.colour, far, near))
         return found

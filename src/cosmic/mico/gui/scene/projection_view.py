@@ -5,7 +5,17 @@ from typing import Final
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QBrush, QColor, QPainter, QPaintEvent, QPen, QPolygonF, QWheelEvent
+from PySide6.QtGui import (
+    QBrush,
+    QColor,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QPixmap,
+    QResizeEvent,
+    QTransform,
+    QWheelEvent,
+)
 from PySide6.QtWidgets import QWidget
 
 from cosmic.frame.gui.painting import painting, saved
@@ -52,11 +62,19 @@ class Panel:
         y = middle.y() - (points_mm[:, up] - self.centre_mm[up]) * self.px_mm
         return np.stack([x, y], axis=1)
 
-    def outline(self, corners_mm: Floats) -> QPolygonF:
-        """Return corners given in the plane as a polygon on the widget."""
-        world = np.zeros((len(corners_mm), 3))
-        world[:, list(self.plane[:2])] = corners_mm
-        return QPolygonF([QPointF(x, y) for x, y in self.project(world)])
+    @property
+    def to_widget(self) -> QTransform:
+        """From millimetres in the plane to the widget."""
+        right, up = self.plane[:2]
+        middle, scale = self.box.center(), self.px_mm
+        return QTransform(
+            scale,
+            0.0,
+            0.0,
+            -scale,
+            middle.x() - self.centre_mm[right] * scale,
+            middle.y() + self.centre_mm[up] * scale,
+        )
 
     def ray(self, place: QPointF) -> Ray:
         """Return the line of sight at a place of the widget."""
@@ -86,6 +104,7 @@ class ProjectionView(SceneView):
         self._sight = Sight()
         self._upright: Plane = FRONT
         self._outlines = Outlines()
+        self._image: QPixmap | None = None
 
     @property
     def reason(self) -> str:
@@ -95,17 +114,18 @@ class ProjectionView(SceneView):
     @override
     def rebuild(self) -> None:
         self._outlines.clear()
-        self.update()
+        self.refresh()
 
     @override
     def refresh(self) -> None:
+        self._image = None
         self.update()
 
     @override
     def look(self, sight: Sight) -> None:
         self._sight = sight
         self._upright = SIDE if abs(sight.azimuth_deg) < 45.0 else FRONT
-        self.update()
+        self.refresh()
 
     def panels(self) -> tuple[Panel, Panel]:
         """Return the two pictures as they lie on the widget now."""
@@ -128,23 +148,43 @@ class ProjectionView(SceneView):
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
-        self.frames += 1
-        palette = self.theme()
+        palette, panels = self.theme(), self.panels()
+        if self._image is None or self._image.devicePixelRatio() != self.devicePixelRatioF():
+            self._image = self._drawn(panels, palette)
+            self.frames += 1
         with painting(self) as painter:
+            painter.drawPixmap(0, 0, self._image)
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            painter.fillRect(self.rect(), QColor(palette.panel))
-            for panel in self.panels():
+            for panel in panels:
+                with saved(painter):
+                    painter.setClipRect(panel.box)
+                    draw_annotations(painter, self.content, panel.project, palette)
+                    _draw_title(painter, panel, palette)
+            notes = [f"{self._reason}: projections"] if self._reason else []
+            room = panels[0].box.adjusted(0, 2.5 * STEP_PX, 0, 0)
+            draw_legend(painter, self.content, room, palette, notes)
+            self.draw_hovered(painter, palette)
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        self._image = None
+        super().resizeEvent(event)
+
+    def _drawn(self, panels: tuple[Panel, Panel], palette: Palette) -> QPixmap:
+        """Return rulers and bodies as they are now: kept, for they take most of the time."""
+        ratio = self.devicePixelRatioF()
+        image = QPixmap(self.size() * ratio)
+        image.setDevicePixelRatio(ratio)
+        image.fill(QColor(palette.panel))
+        with painting(image) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            for panel in panels:
                 painter.fillRect(panel.box, QColor(palette.window))
                 _draw_rulers(painter, panel, palette)
                 with saved(painter):
                     painter.setClipRect(panel.box)
                     self._draw_bodies(painter, panel, palette)
-                    draw_annotations(painter, self.content, panel.project, palette)
-                    _draw_title(painter, panel, palette)
-            notes = [f"{self._reason}: projections"] if self._reason else []
-            room = self.panels()[0].box.adjusted(0, 2.5 * STEP_PX, 0, 0)
-            draw_legend(painter, self.content, room, palette, notes)
-            self.draw_hovered(painter, palette)
+        return image
 
     def _draw_bodies(self, painter: QPainter, panel: Panel, palette: Palette) -> None:
         shown = self.content.shown
@@ -153,9 +193,13 @@ class ProjectionView(SceneView):
             for body, mesh in shown.items()
             for outline in self._outlines.of(mesh, self.content.poses[body], panel.plane)
         ]
+        to_widget = panel.to_widget
         for outline in sorted(outlines, key=lambda each: each.nearest_mm):
-            self._draw_outline(painter, panel, outline, palette)
-        painter.setPen(QPen(QColor(palette.refused), 1.5, Qt.PenStyle.DashLine))
+            place = QTransform.fromTranslate(*outline.shift_mm) * to_widget
+            if place.mapRect(outline.shape_mm.boundingRect()).intersects(panel.box):
+                painter.setTransform(place)
+                self._draw_outline(painter, panel, outline, palette)
+        painter.setPen(_pen(palette.refused, 1.5, Qt.PenStyle.DashLine))
         ground = QColor(palette.refused)
         ground.setAlphaF(0.3)
         painter.setBrush(ground)
@@ -163,26 +207,28 @@ class ProjectionView(SceneView):
         for body, pose in self.content.ghosts.items():
             if body in shown:
                 for outline in ghosts.of(shown[body], pose, panel.plane):
-                    painter.drawPolygon(panel.outline(outline.corners_mm))
+                    painter.setTransform(QTransform.fromTranslate(*outline.shift_mm) * to_widget)
+                    painter.drawPolygon(outline.shape_mm)
 
     def _draw_outline(
         self, painter: QPainter, panel: Panel, outline: Outline, palette: Palette
     ) -> None:
         red, green, blue, opacity = outline.colour
-        shape = panel.outline(outline.corners_mm)
         if outline.farthest_mm > panel.begins_mm:
-            painter.setPen(QPen(QColor(palette.border_strong), 1.0, Qt.PenStyle.DotLine))
+            painter.setPen(_pen(palette.border_strong, 1.0, Qt.PenStyle.DotLine))
             painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.drawPolygon(shape)
+            painter.drawPolygon(outline.shape_mm)
             return
         fill = QColor.fromRgbF(red, green, blue, 0.8 * opacity)
         edge = blend(QColor.fromRgbF(red, green, blue).name(), palette.text, 0.6)
-        painter.setPen(QPen(QColor(edge), 1.0))
+        painter.setPen(_pen(edge, 1.0))
         painter.setBrush(fill)
-        painter.drawPolygon(shape)
+        painter.drawPolygon(outline.shape_mm)
         if outline.body in self.content.unwatched:
-            painter.setBrush(QBrush(QColor(palette.warning), Qt.BrushStyle.BDiagPattern))
-            painter.drawPolygon(shape)
+            hatch = QBrush(QColor(palette.warning), Qt.BrushStyle.BDiagPattern)
+            hatch.setTransform(painter.transform().inverted()[0])  # in pixels, not in millimetres
+            painter.setBrush(hatch)
+            painter.drawPolygon(outline.shape_mm)
 
     # The mouse
 
@@ -212,14 +258,21 @@ class ProjectionView(SceneView):
         centre[panel.plane[1]] += moved.y() / panel.px_mm
         x, y, z = centre
         self._sight = replace(self._sight, centre_mm=(x, y, z))
-        self.update()
+        self.refresh()
 
     @override
     def wheelEvent(self, event: QWheelEvent) -> None:
         radius = self._sight.radius_mm * 1.0015 ** -event.angleDelta().y()
         self._sight = replace(self._sight, radius_mm=float(np.clip(radius, 0.2, 5000.0)))
-        self.update()
+        self.refresh()
         event.accept()
+
+
+def _pen(colour: str, width: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
+    """Return a pen as wide as it says, in pixels, however the painter scales."""
+    pen = QPen(QColor(colour), width, style)
+    pen.setCosmetic(True)
+    return pen
 
 
 def _draw_title(painter: QPainter, panel: Panel, palette: Palette) -> None:

@@ -45,6 +45,8 @@ class SceneView(QWidget):
         self._dragged_from = QPointF()
         self._moving = self._aiming = False
         self.setMouseTracking(True)
+        # Nothing shines through: a live image below it does not have it painted anew.
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         # Keys belong to what jogs the axes: this view never takes them.
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
