@@ -15,14 +15,17 @@ from typing import Final
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
-from PySide6.QtCore import QSettings
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QPointF, QSettings
+from PySide6.QtWidgets import QApplication, QMenu, QPushButton
 
 from cosmic.app.platform import build_platform
 from cosmic.app.rig import Rig
+from cosmic.app.windows.fibre_menu import FibreOperations
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.app.windows.tasks import HANDLE, LOOK, MEASURE, SET_UP, TaskLayout
 from cosmic.daqco.gui.main_widget import make_daqco_gui
+from cosmic.frame.gui.painting import painting
+from cosmic.frame.gui.theme import State
 from cosmic.frame.log import RingBufferHandler, set_up_logging
 from cosmic.frame.threads import declare_gui_thread
 from cosmic.mico.gui.mico_widget import make_mico_gui
@@ -30,13 +33,23 @@ from cosmic.vico.gui.vico_gui import make_vico_gui
 
 IMAGES: Final = Path(__file__).parent / "images"
 SIZE: Final = (1366, 768)
-LONGEST_S: Final = 120.0
+LONGEST_S: Final = 900.0
+FAST: Final = 8.0
+"""Rate of the scene that takes minutes."""
 
 
 class Scene:
     """A window over a simulated platform, and what a scene needs of it."""
 
-    def __init__(self, app: QApplication, folder: Path, *, cold: bool = False) -> None:
+    def __init__(
+        self,
+        app: QApplication,
+        folder: Path,
+        *,
+        cold: bool = False,
+        sample: str | None = None,
+        rate: float = 1.0,
+    ) -> None:
         self._app = app
         ring = RingBufferHandler()
         self._undo = set_up_logging(ring)
@@ -45,6 +58,8 @@ class Scene:
             applications=("mico", "daqco", "vico"),
             world="plain",
             cold=cold,
+            sample=sample,
+            rate=rate,
             mico_gui=make_mico_gui,
             daqco_gui=make_daqco_gui,
             vico_gui=make_vico_gui,
@@ -94,14 +109,18 @@ class Scene:
         thread.start()
         self.until(lambda: not thread.is_alive())
 
-    def save(self, name: str) -> None:
-        """Save what is seen."""
+    def save(self, name: str, menu: QMenu | None = None) -> None:
+        """Save what is seen; `menu` lies over it, with its corner where it was opened."""
         self.wait(0.5)
         book = self.tasks.book
         for number, each in enumerate(book.alarms):
             if each.source == "processor":  # of the computer that makes the images
                 book.acknowledge(number)
-        self.window.grab().save(str(IMAGES / f"{name}.png"))
+        image = self.window.grab()
+        if menu is not None:
+            with painting(image) as painter:
+                painter.drawPixmap(self.window.mapFromGlobal(menu.pos()), menu.grab())
+        image.save(str(IMAGES / f"{name}.png"))
 
     def close(self) -> None:
         """Close the window."""
@@ -244,6 +263,109 @@ def steer_with_a_gamepad(scene: Scene) -> None:
     steering.stop()
 
 
+def look_at_a_fibre(scene: Scene) -> None:
+    """Show the fibres measured."""
+    scene.choose(LOOK)
+    view = scene.tasks.stage.camera
+    view.camera.switch("fibres", on=True)
+    scene.window.raise_panel("Camera")
+    scene.until(lambda: view.camera.analysis is not None)
+    scene.wait(2.0)
+    scene.save("look-at-a-fibre")
+
+
+def record_and_repeat(scene: Scene) -> None:
+    """Show a trajectory at its third line."""
+    scene.choose(HANDLE)
+    scene.window.raise_panel("Trajectories")
+    mico = scene.rig.mico
+    mico["left.x"].set_closed_loop_frequency(100)
+
+    def record() -> None:
+        with mico.trajectories.record(scene.folder / "over.trajectory", timed=False):
+            mico["left.z"].move_by(400.0)
+            mico.move_by({"left.x": -300.0, "left.y": 150.0})
+            mico["left.z"].move_by(-400.0)
+        mico.move({"left.x": 0.0, "left.y": 0.0})
+
+    scene.behind(record)
+    panel = scene.window.procedures
+    if panel is None:
+        raise RuntimeError("the window has no trajectories")
+    panel.trajectories.open(scene.folder / "over.trajectory")
+    scene.until(lambda: panel.trajectories.trajectory is not None)
+    step = panel.trajectories.findChild(QPushButton, "step")
+    if step is None:
+        raise RuntimeError("the panel has no button Step")
+    step.click()
+    scene.wait(2.0)
+    scene.save("record-and-repeat")
+
+
+def _done(scene: Scene, title: str) -> None:
+    """Wait until an operation on a fibre has ended, well."""
+    operations = scene.tasks.operations
+    if operations is None:
+        raise RuntimeError("the window has no operations on fibres")
+    scene.until(lambda: not operations.running and title in operations.card.title.text())
+    scene.wait(0.5)
+    if operations.card.badge.state is not State.OK:
+        raise RuntimeError(f"{title}: {operations.card.line.text()}")
+
+
+def _take(scene: Scene, operations: FibreOperations) -> None:
+    """Right-click the longest fibre, show what the menu offers, and take it."""
+    view = scene.tasks.stage.camera
+    found = view.camera.analysis
+    if found is None:
+        raise RuntimeError("no fibre was found")
+    fibre = max((e for e in found.fibres if e.certain), key=lambda each: each.length_px)
+    x, y = fibre.centre_line_px[len(fibre.centre_line_px) // 2]
+    menu = QMenu(view)
+    operations.offer(view, menu, (float(x), float(y)))
+    menu.popup(view.view.mapToGlobal(view.view.to_screen.map(QPointF(x, y)).toPoint()))
+    take = next(each for each in menu.actions() if each.text() == "Take with left")
+    menu.setActiveAction(take)
+    take.hover()
+    scene.save("tour-take", menu)
+    menu.close()
+    take.trigger()
+
+
+def tour(scene: Scene) -> None:
+    """Pick up a fibre, bend it to 50 uN, record that, read the slope: the README's pictures."""
+    scene.choose(LOOK)
+    scene.choose(HANDLE)
+    tasks, operations = scene.tasks, scene.tasks.operations
+    view = tasks.stage.camera
+    if operations is None or tasks.force is None:
+        raise RuntimeError("the window has no operations on fibres")
+    tasks.folder.home = scene.folder / "sessions"
+    operations.find(view, on=True)
+    scene.until(lambda: any(e.certain for e in getattr(view.camera.analysis, "fibres", ())))
+    scene.wait(1.0)
+    _take(scene, operations)
+    _done(scene, "Take with left")
+    scene.save("tour-held")
+    operations.card.next.click()
+    _done(scene, "Bring to the probe")
+    scene.choose(MEASURE)
+    tasks.force.record.click()
+    scene.until(tasks.force.record.isChecked)
+    operations.card.push.click()
+    _done(scene, "Push to 50")
+    scene.save("handle-a-fibre")
+    recording = scene.rig.daqco.recording.path
+    tasks.force.record.click()
+    scene.until(lambda: not scene.rig.daqco.recording.active)
+    scene.choose("Results")
+    if recording is not None:
+        tasks.results.sessions.show_file(recording)
+    scene.until(lambda: bool(tasks.results.viewer.timelines))
+    scene.wait(2.0)
+    scene.save("tour-results")
+
+
 SCENES: Final[dict[str, Callable[[Scene], None]]] = {
     "operator-window": operator_window,
     "window-set-up": window_set_up,
@@ -254,6 +376,9 @@ SCENES: Final[dict[str, Callable[[Scene], None]]] = {
     "measure-a-force": measure_a_force,
     "scene-refused": scene_refused,
     "steer-with-a-gamepad": steer_with_a_gamepad,
+    "look-at-a-fibre": look_at_a_fibre,
+    "record-and-repeat": record_and_repeat,
+    "tour": tour,
 }
 
 
@@ -267,7 +392,14 @@ def main(names: list[str]) -> int:
     end = declare_gui_thread()
     for name in names or list(SCENES):
         with tempfile.TemporaryDirectory() as folder:
-            scene = Scene(app, Path(folder), cold=name in ("initialise", "first-day"))
+            on_the_plate = name in ("tour", "look-at-a-fibre")
+            scene = Scene(
+                app,
+                Path(folder),
+                cold=name in ("initialise", "first-day"),
+                sample="three-dry" if on_the_plate else None,
+                rate=FAST if name == "tour" else 1.0,
+            )
             try:
                 SCENES[name](scene)
             finally:

@@ -155,7 +155,8 @@ def test_one_that_was_stopped_is_shown_as_stopped_and_resume_goes_on_in_its_fold
     assert panel.board.state.text() == "stopped"
     assert "a hand on the button" in panel.procedure.reason.text()
     assert panel.procedure.resume.isEnabled()
-    assert panel.message.text() == "Resume goes on in here; Start begins a new one"
+    assert panel.message.text() == "Resume goes on in here; Start begins a new one beside it"
+    assert panel.folder.text() == str(tmp_path / "here"), "the one that Resume goes on in"
     assert panel.message.isVisible()
     panel.recipe.setCurrentText("quick")  # what is chosen meanwhile is for the next one
     press(qtbot, panel.procedure.resume)
@@ -167,6 +168,18 @@ def test_one_that_was_stopped_is_shown_as_stopped_and_resume_goes_on_in_its_fold
     assert panel.board.state.text() == "ended"
     assert not panel.procedure.resume.isEnabled(), "it did what was asked"
     assert not panel.message.text()
+
+
+def test_start_after_an_early_end_begins_in_a_folder_of_its_own(
+    panel, qtbot, tmp_path, opened
+) -> None:
+    panel.folder.setText(str(tmp_path / "here"))
+    press(qtbot, panel.procedure.step)
+    panel.campaign.abort("a hand on the button")
+    panel.refresh()
+    panel.procedure.refresh()
+    press(qtbot, panel.procedure.start)
+    assert opened[-1][1] != tmp_path / "here"
 
 
 def test_a_finished_fibre_is_shown_and_can_be_replayed(panel, qtbot, tmp_path) -> None:

@@ -5,14 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSettings, Qt
 from PySide6.QtGui import QAction
 from pytestqt.qtbot import QtBot
 
 import cosmic
+from cosmic.app.panels.calculated import Calculation
 from cosmic.app.panels.force_analysis import LowPass, RecentValues
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.scale import VOLTS
+from cosmic.frame.errors import ConfigError
 from gui.app.windows import Make
 
 RATE_HZ = 1000.0
@@ -72,6 +74,67 @@ def test_a_filter_takes_the_hum_away_and_leaves_the_level() -> None:
     values = np.concatenate([each.values[0] for each in filtered])[2000:]
     assert values.mean() == pytest.approx(7.0, abs=0.05)
     assert np.ptp(values) < 0.5
+
+
+def test_a_formula_is_calculated_sample_by_sample() -> None:
+    volts = np.array([[1.0, 2.0, 3.0], [0.5, 0.0, -4.0]])
+    chunk = DataChunk(7, 0.1, RATE_HZ, ("force", "arm.aux"), volts, (VOLTS, VOLTS))
+    found = Calculation("-(force - 2 * arm.aux) / 2 + abs(arm.aux)").chunk(chunk)
+    assert found.values[0].tolist() == [0.5, -1.0, -1.5]
+    assert found.first_sample == 7
+    nothing = Calculation("sqrt(arm.aux) / 0").chunk(chunk)
+    assert np.isnan(nothing.values).all()
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        "",
+        "2 + 3",
+        "force +",
+        "__import__('os').system('true')",
+        "force.real.imag",
+        "force ** 99999",
+        "abs(force, 2)",
+        "[force]",
+        "'force'",
+        "force if force else 0",
+        "force" + " + force" * 40,
+        "(" * 190,
+    ],
+)
+def test_what_is_no_formula_is_refused_and_runs_nothing(formula: str) -> None:
+    with pytest.raises(ConfigError):
+        Calculation(formula)
+
+
+def test_a_formula_says_which_channel_is_missing() -> None:
+    assert "no channel sparse; there are force, spare" in Calculation("force - sparse").missing(
+        ("force", "spare")
+    )
+
+
+def test_a_calculated_channel_is_drawn_beside_the_force_and_kept_for_the_next_start(
+    make: Make, qtbot: QtBot, stored: QSettings
+) -> None:
+    window = make(applications=("mico", "daqco", "vico"), rate=1.0)
+    assert window.workspaces is not None
+    window.workspaces.choose("Measure")
+    tasks = window.tasks
+    assert tasks is not None
+    force = tasks.force
+    assert force is not None
+    next(each for each in force.more.menu().actions() if "Calculated" in each.text()).trigger()
+    qtbot.keyClicks(force.formula, "force - sparse")
+    qtbot.keyClick(force.formula, Qt.Key.Key_Return)
+    assert "no channel sparse" in force.message.text()
+    force.formula.setText("10 + 0 * force")
+    qtbot.keyClick(force.formula, Qt.Key.Key_Return)
+    assert force.curves.currentWidget() is force.calculated
+    qtbot.waitUntil(lambda: force.calculated.newest == 10.0)
+    qtbot.waitUntil(lambda: force.statistics.text() == "10 + 0 * force = 10")
+    window.close()
+    assert stored.value("force/calculated") == "10 + 0 * force"
 
 
 def test_the_menu_of_the_force_does_what_it_says(

@@ -32,8 +32,10 @@ from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.limit_indicator import LimitIndicator
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.stop_button import StopButton
+from cosmic.vico.api.vico import vico_of
 from cosmic.vico.core.calibration import Plane
 from cosmic.vico.core.calibration_fit import Sighting, fit_map
+from cosmic.vico.hw.peripherals import LensAxis
 from gui.app.windows import Make, mico
 from gui.mico.panels import part, position
 
@@ -184,6 +186,44 @@ def test_a_row_moves_its_axis_through_the_gate(whole: OperatorWindow, qtbot: QtB
     qtbot.mouseClick(row.go_to, LEFT)
     qtbot.waitUntil(lambda: "9" in row.target.reason)
     qtbot.waitUntil(lambda: "REFUSED" in row.line.text())
+
+
+def test_a_pose_is_kept_by_a_name_and_offered_with_a_picture(
+    whole: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(whole, qtbot, HANDLE)
+    tool = tasks(whole).tool
+    qtbot.waitUntil(lambda: mico(whole).cards["left.x"].axis.details.present)
+    qtbot.mouseClick(tool.keep, LEFT)
+    tool.pose_name.setText("before the probe")
+    qtbot.keyClick(tool.pose_name, Qt.Key.Key_Return)
+    assert tool.poses.currentText() == "before the probe"
+    tool.poses.showPopup()
+    assert not tool.poses.itemIcon(0).isNull()
+    tool.poses.hidePopup()
+
+
+def test_initialise_homes_the_lens_and_lights_a_lamp_that_is_off(make: Make, qtbot: QtBot) -> None:
+    window = make(applications=("mico", "daqco", "vico"), cold=True)
+    with_image(window, qtbot)
+    vico = window.platform.vico
+    assert vico is not None
+    lens, lamp = vico_of(vico).lens, vico_of(vico).light
+    assert lens is not None
+    assert lamp is not None
+    lamp.set_percent(0.0).wait(10.0)
+    zoom = lens.state(LensAxis.ZOOM)
+    assert zoom is not None
+    assert not zoom.homed
+    mico(window).initialisation_begun.emit()
+    qtbot.waitUntil(lambda: lamp.percent == 50.0)
+
+    def homed() -> bool:
+        states = [lens.state(axis) for axis in LensAxis]
+        return all(each is not None and each.homed for each in states)
+
+    qtbot.waitUntil(homed, timeout=15_000)
+    assert "the lens is homed" in window.drawer.line.text()
 
 
 def test_one_key_swaps_image_and_scene(whole: OperatorWindow, qtbot: QtBot) -> None:

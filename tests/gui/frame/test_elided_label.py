@@ -25,3 +25,16 @@ def test_the_same_text_again_changes_nothing_and_another_does(qtbot):
     assert (label.text(), label.toolTip(), counter.tips) == ("one two", "one\ntwo\nAxis left.x", 1)
     label.set_text("three")
     assert (label.text(), label.toolTip(), counter.tips) == ("three", "three\nAxis left.x", 2)
+
+
+def test_where_the_whole_has_no_room_a_shorter_text_is_shown_and_no_number_is_cut(qtbot):
+    label = ElidedLabel()
+    qtbot.addWidget(label)
+    texts = ("ARMED ±150, 149 to go", "±150, 149 to go", "149 to go")
+    label.set_text(*texts)
+    label.show()
+    widths = [label.fontMetrics().horizontalAdvance(each) for each in texts]
+    for width, text in zip(widths, texts, strict=True):
+        label.resize(width, 20)
+        assert label.shown_text == text
+    assert label.toolTip() == texts[0]

@@ -71,6 +71,15 @@ def test_the_theme_in_force_is_known_to_widgets(qapp: QApplication) -> None:
     assert current_palette() is DARK
 
 
+def test_another_theme_makes_no_other_style(qapp: QApplication) -> None:
+    apply_theme(qapp, "light")
+    style = qapp.style()
+    apply_theme(qapp, "dark")
+    assert qapp.style() is style
+    qapp.setStyleSheet("")
+    assert qapp.style().name() == "fusion"
+
+
 def test_an_unknown_theme_is_refused(qapp: QApplication) -> None:
     with pytest.raises(ValueError, match="there is no theme 'pink'"):
         apply_theme(qapp, "pink")  # type: ignore[arg-type]

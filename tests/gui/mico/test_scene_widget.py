@@ -10,6 +10,8 @@ from PySide6.QtWidgets import QApplication, QLabel, QToolButton, QWidget
 
 from cosmic.frame.gui.theme import apply_theme
 from cosmic.mico.core.collision.answer import Approach
+from cosmic.mico.core.poses import Pose
+from cosmic.mico.gui.scene.pose_picture import PosePictures
 from cosmic.mico.gui.scene.projection_view import ProjectionView
 from cosmic.mico.gui.scene.scene_widget import SceneWidget
 from gui.mico.scene_models import two_arms
@@ -130,6 +132,27 @@ def test_what_lies_below_the_scene_does_not_have_it_painted(qtbot):
     scene.view.update()
     QApplication.processEvents()
     assert painted == ["anew"]
+
+
+def test_an_inset_shows_one_picture_and_no_words_on_each_other(scene):
+    assert len(scene.view.panels()) == 2
+    scene.set_compact(True)
+    scene.resize(190, 142)
+    QApplication.processEvents()
+    (panel,) = scene.view.panels()
+    assert panel.box.width() == scene.view.width()
+    assert picture(scene).std() > 5.0
+
+
+def test_a_pose_has_a_picture_of_its_own_drawn_once(qapp):
+    pictures = PosePictures(two_arms())
+    home, away = Pose("home", {"left.x": 0.0}), Pose("away", {"left.x": 4000.0})
+    first, second = pictures.of(home).toImage(), pictures.of(away).toImage()
+    assert first != second
+    assert pictures.of(Pose("again", {"left.x": 0.0})) is pictures.of(home)
+    apply_theme(qapp, "light")
+    assert pictures.of(home).toImage() != first
+    apply_theme(qapp, "dark")
 
 
 def test_an_axis_that_is_not_named_or_not_known_stays_where_it_was(scene):

@@ -8,31 +8,28 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final, TypeVar
 
-import numpy as np
-import pyqtgraph as pg
-from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QAction, QActionGroup, QColor, QPaintEvent, QPen
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QLineEdit,
     QMenu,
     QPushButton,
-    QSizePolicy,
     QStackedWidget,
     QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
-from cosmic.app.panels.curve_frame import CurveFrame
+from cosmic.app.panels.calculated import CalculatedCurve, Calculation
 from cosmic.app.panels.force_analysis import LowPass, RecentValues, SpectrumCurve
 from cosmic.app.panels.force_calibration import ForceCalibrationDialog
+from cosmic.app.panels.force_curves import AXIS_PX, LimitBar, PositionCurve
 from cosmic.daqco.api.daqco import Daqco, DaqLimit
 from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.gui.asking import Asking
-from cosmic.daqco.gui.colours import readable
 from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.limit_indicator import distance
 from cosmic.daqco.gui.plot.chart import Chart, Trace
@@ -40,15 +37,13 @@ from cosmic.daqco.gui.plot.inbox import ChunkInbox
 from cosmic.daqco.gui.plot.unit_ranges import UnitRanges
 from cosmic.daqco.gui.plot.units import display_unit
 from cosmic.frame.clock import WALL
-from cosmic.frame.errors import CosmicError
+from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.file_names import NameOption
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button, styled, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
-from cosmic.frame.gui.painting import painting
-from cosmic.frame.gui.palette import OKABE_ITO, Palette
 from cosmic.frame.gui.relay import Relay
-from cosmic.frame.gui.theme import STEP_PX, State, current_palette, number_font, state_look
+from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
 from cosmic.frame.overrides import override
 from cosmic.mico.gui.mico_widget import MicoWidget
 
@@ -60,17 +55,18 @@ OLD_S: Final = 1.0
 MEAN_S: Final = 0.1
 VALUE_PX: Final = 26
 SPAN_S: Final = 10.0
-AXIS_PX: Final = 48
 TARE_SHARE: Final = 0.25
 """Of the limit: a load beyond it is no zero, and Tare refuses it."""
 LOW_PX: Final = 20 * STEP_PX
 """Below this height an axis has three numbers only."""
-_POINTS: Final = 4000
 BEFORE_S: Final = 3.0
 FILTERS_HZ: Final = (100.0, 30.0, 10.0, 3.0, 1.0)
 _ANALYSIS_LOOKS: Final = 5
 """Statistics and spectrum are made anew at each so many read-outs."""
-_STILL_UM: Final = 0.05
+FORMULA_TIP: Final = (
+    "A formula of channels, numbers, + - * /, abs() and sqrt(); Enter draws it, an empty line ends "
+    "it. It is shown and not recorded: the channels are"
+)
 
 
 def sides_text(low: float | None, high: float | None) -> str:
@@ -78,101 +74,6 @@ def sides_text(low: float | None, high: float | None) -> str:
     if low is not None and high is not None and low == -high:
         return f"±{high:g}"
     return " to ".join("free" if each is None else f"{each:g}" for each in (low, high))
-
-
-class LimitBar(QWidget):
-    """The value between the two sides of its limit, and how much of the way there is gone."""
-
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._value: float | None = None
-        self._low: float | None = None
-        self._high: float | None = None
-        self._armed = False
-        self.setFixedHeight(2 * STEP_PX)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-
-    def show_value(
-        self, value: float | None, low: float | None, high: float | None, *, armed: bool
-    ) -> None:
-        """Show another value; None: it is not measured."""
-        now = (value, low, high, armed)
-        if now != (self._value, self._low, self._high, self._armed):
-            self._value, self._low, self._high, self._armed = now
-            self.update()
-
-    @property
-    def share(self) -> float:
-        """How much of the way to the nearer side is gone, 0 to 1; 0 where nothing is measured."""
-        if self._value is None:
-            return 0.0
-        side = self._high if self._value >= 0.0 else self._low
-        return min(1.0, abs(self._value / side)) if side else 0.0
-
-    @override
-    def paintEvent(self, event: QPaintEvent) -> None:
-        palette = current_palette()
-        with painting(self) as painter:
-            box = QRectF(self.rect()).adjusted(0.5, 2.5, -0.5, -2.5)
-            painter.setPen(QColor(palette.border_strong))
-            painter.setBrush(QColor(palette.field))
-            painter.drawRect(box)
-            middle = box.center().x()
-            if self._value is not None:
-                reach = self.share * box.width() / 2.0
-                colour = "vermillion" if self.share > 0.8 else "orange" if self.share > 0.5 else ""
-                fill = OKABE_ITO[colour] if colour else palette.accent
-                left = middle if self._value >= 0.0 else middle - reach
-                painter.setPen(Qt.PenStyle.NoPen)
-                painter.setBrush(QColor(fill))
-                painter.drawRect(QRectF(left, box.top() + 1.0, reach, box.height() - 1.0))
-            pen = QPen(QColor(palette.text), 1.0)
-            if not self._armed:
-                pen.setStyle(Qt.PenStyle.DotLine)
-            painter.setPen(pen)
-            for x in (box.left(), middle, box.right()):
-                painter.drawLine(round(x), 0, round(x), self.height())
-
-
-class PositionCurve(CurveFrame):
-    """Force over the position of the axis that moved last."""
-
-    def __init__(self) -> None:
-        super().__init__(AXIS_PX)
-        self._points: deque[tuple[float, float]] = deque(maxlen=_POINTS)
-        self.axis = ""
-        box, self._left = self._add_field("force")
-        self._below = self._add_axis_below("position")
-        self._curve = pg.PlotCurveItem()
-        box.addItem(self._curve)
-        self._restyle()
-
-    def name_force(self, unit: str) -> None:
-        """Say in which unit the force is drawn."""
-        self._names[self._left] = f"force, {unit}"
-        self._restyle()
-
-    def add(self, axis: str, unit: str, position: float, force: float) -> None:
-        """Add a point; another axis begins anew."""
-        if axis != self.axis:
-            self.axis = axis
-            self._points.clear()
-            self._names[self._below] = f"{axis}, {unit}"
-            self._restyle()
-        if self._points and abs(self._points[-1][0] - position) < _STILL_UM:
-            return
-        self._points.append((position, force))
-        places, forces = zip(*self._points, strict=True)
-        self._curve.setData(np.array(places), np.array(forces))
-
-    @property
-    def points(self) -> tuple[tuple[float, float], ...]:
-        """Position and force of what is drawn."""
-        return tuple(self._points)
-
-    @override
-    def _colour(self, palette: Palette) -> None:
-        self._curve.setPen(pg.mkPen(readable(OKABE_ITO["orange"]), width=1.5))
 
 
 class ForcePanel(QWidget):
@@ -246,18 +147,14 @@ class ForcePanel(QWidget):
             named(push_button("Limit…", "Set, arm or disarm the limit"), "arm"), "narrow"
         )
         self.arm.clicked.connect(self._on_limit)
-        self.chart = Chart()
-        self.chart.setMinimumSize(18 * STEP_PX, 9 * STEP_PX)
-        self.over = PositionCurve()
-        self.over.setMinimumSize(18 * STEP_PX, 9 * STEP_PX)
-        self.curves = QStackedWidget()
-        self.curves.addWidget(self.chart)
-        self.curves.addWidget(self.over)
-        self.spectrum = SpectrumCurve(AXIS_PX)
-        self.curves.addWidget(self.spectrum)
+        self._make_curves()
         self.statistics = named(ElidedLabel(), "forceStatistics")
         self.statistics.setFont(number_font(11))
         self.statistics.hide()
+        self.formula = named(tipped(QLineEdit(), FORMULA_TIP), "forceFormula")
+        self.formula.setPlaceholderText("force - 2 * spare")
+        self.formula.returnPressed.connect(lambda: self.calculate(self.formula.text()))
+        self.formula.hide()
         self._make_menu()
         self.by_time = self._curve_button("over time", 0)
         self.by_position = self._curve_button("over position", 1)
@@ -275,11 +172,28 @@ class ForcePanel(QWidget):
         self.mark.clicked.connect(self._on_mark)
         self.message = named(ElidedLabel(), "forceMessage")
 
+    def _make_curves(self) -> None:
+        self.chart = Chart()
+        self.chart.setMinimumSize(18 * STEP_PX, 9 * STEP_PX)
+        self.over = PositionCurve()
+        self.over.setMinimumSize(18 * STEP_PX, 9 * STEP_PX)
+        self.curves = QStackedWidget()
+        self.curves.addWidget(self.chart)
+        self.curves.addWidget(self.over)
+        self.spectrum = SpectrumCurve(AXIS_PX)
+        self.curves.addWidget(self.spectrum)
+        self.calculated = CalculatedCurve()
+        self.calculated.setMinimumSize(18 * STEP_PX, 9 * STEP_PX)
+        self.curves.addWidget(self.calculated)
+
     def _make_menu(self) -> None:
         self.more = styled(
-            named(tipped(QToolButton(), "Filter, statistics, spectrum"), "more"), "tool menu"
+            named(
+                tipped(QToolButton(), "Filter, statistics, spectrum, calculated channel"), "more"
+            ),
+            "tool menu",
         )
-        self.more.setFixedWidth(20)
+        self.more.setFixedWidth(3 * STEP_PX)
         self.more.setText("⋯")
         self.more.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         menu = QMenu(self.more)
@@ -294,6 +208,8 @@ class ForcePanel(QWidget):
         spectrum.triggered.connect(self._on_spectrum)
         weights = menu.addAction("Calibrate with weights…")
         weights.triggered.connect(self._on_calibrate)
+        calculated = menu.addAction("Calculated channel…")
+        calculated.triggered.connect(self._on_calculated)
         filters = menu.addMenu("Filter what is shown")
         self.filters = QActionGroup(filters)
         for cut_hz in (0.0, *FILTERS_HZ):
@@ -310,17 +226,56 @@ class ForcePanel(QWidget):
         self._filter = LowPass(cut_hz) if cut_hz else None
 
     def _on_spectrum(self) -> None:
+        self._show_curve(self.spectrum)
+
+    def _show_curve(self, curve: QWidget) -> None:
+        """Show a curve that has no button of its own."""
         for button in (self.by_time, self.by_position):
             button.setAutoExclusive(False)
             button.setChecked(False)
             button.setAutoExclusive(True)
-        self.curves.setCurrentWidget(self.spectrum)
+        self.curves.setCurrentWidget(curve)
+
+    def _on_calculated(self) -> None:
+        self.formula.show()
+        self.formula.setFocus()
+        self.formula.selectAll()
+
+    def calculate(self, formula: str) -> None:
+        """Draw what a formula gives of the channels; an empty one: the force again."""
+        if not formula.strip():
+            self.calculated.calculation = None
+            self.formula.hide()
+            self.statistics.setVisible(self.numbers.isChecked())
+            self.by_time.click()
+            return
+        try:
+            found = Calculation(formula)
+        except ConfigError as exc:
+            self._say(str(exc), refused=True)
+            return
+        missing = found.missing(tuple(self._daqco.channels))
+        if missing:
+            self._say(missing, refused=True)
+            return
+        self._say("")
+        self.formula.setText(found.formula)
+        self.formula.show()
+        self.calculated.calculate(found, self._daqco.rate_hz, SPAN_S)
+        self.statistics.show()
+        self._show_curve(self.calculated)
 
     def _show_analysis(self) -> None:
         """Show statistics and spectrum, where they are seen."""
         self._looks = (self._looks + 1) % _ANALYSIS_LOOKS
         if self._looks or not self.isVisible():
             return
+        if self.curves.currentWidget() is self.calculated:
+            value = self.calculated.newest
+            shown = "–" if value is None else f"{value:.4g}"
+            self.statistics.set_text(f"{self.formula.text()} = {shown}")
+            return
+        self.statistics.setVisible(self.numbers.isChecked())
         if self.numbers.isChecked():
             found = self._window.statistics()
             if found is None:
@@ -369,7 +324,7 @@ class ForcePanel(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX // 2)
         column.setSpacing(STEP_PX // 2)
-        for widget in (head, self.bar, limit, which):
+        for widget in (head, self.bar, limit, which, self.formula):
             column.addWidget(widget)
         column.addWidget(self.curves, 1)
         column.addWidget(self.statistics)
@@ -404,6 +359,9 @@ class ForcePanel(QWidget):
         channels, limits = daqco.channels, daqco.limits
         limited = [each.settings.channel for each in limits if each.settings.channel in channels]
         self._channel = next(iter([*limited, *channels]), "")
+        calculation = self.calculated.calculation
+        if calculation is not None and self.calculated.rate_hz != daqco.rate_hz:
+            self.calculated.calculate(calculation, daqco.rate_hz, SPAN_S)
         key = (self._channel, daqco.rate_hz, daqco.scales.get(self._channel))
         if key != self._key and self._channel:
             self._key = key
@@ -424,7 +382,9 @@ class ForcePanel(QWidget):
 
     def refresh(self) -> None:
         """Draw what has come since the last time."""
-        mine = [self._own(chunk) for chunk in self._inbox.take() if self._channel in chunk.channels]
+        taken = self._inbox.take()
+        self.calculated.feed_from(taken)
+        mine = [self._own(chunk) for chunk in taken if self._channel in chunk.channels]
         if not mine:
             return
         self._heard_s = WALL.now_s()
@@ -490,22 +450,25 @@ class ForcePanel(QWidget):
         high = limit.settings.high if limit is not None else None
         armed = limit is not None and limit.settings.armed
         self.bar.show_value(value if fresh else None, low, high, armed=armed)
-        self.limit.set_text(self._limit_words(limit, value if fresh else None))
+        self.limit.set_text(*self._limit_words(limit, value if fresh else None))
         if self._recording:
             self._show_recording()
         self._show_analysis()
 
-    def _limit_words(self, limit: DaqLimit | None, value: float | None) -> str:
+    def _limit_words(self, limit: DaqLimit | None, value: float | None) -> tuple[str, ...]:
+        """Return what is said of the limit, and shorter, for a narrow window."""
         unit = display_unit(self._daqco.units.get(self._channel, ""))
         if limit is None:
-            return "▲ no limit"
+            return ("▲ no limit",)
         sides = sides_text(limit.settings.low, limit.settings.high)
         if limit.crossed:
-            return f"■ crossed {sides} {unit}"
+            return f"■ crossed {sides} {unit}", "■ crossed"
         if not limit.settings.armed:
-            return f"▲ DISARMED {sides} {unit}"
-        left = f", {distance(limit, value):.0f} to go" if value is not None else ""
-        return f"ARMED {sides}{left}" if left else f"ARMED {sides} {unit}"
+            return f"▲ DISARMED {sides} {unit}", "▲ DISARMED"
+        if value is None:
+            return f"ARMED {sides} {unit}", f"ARMED {sides}", sides
+        left = f"{distance(limit, value):.0f} to go"
+        return f"ARMED {sides}, {left}", f"{sides}, {left}", left
 
     # Commands
 

@@ -8,7 +8,6 @@ from typing import Final
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QButtonGroup,
-    QComboBox,
     QGridLayout,
     QLabel,
     QLineEdit,
@@ -20,6 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.app.panels.gripper_row import GripperRow
+from cosmic.app.panels.pose_choice import PoseChoice
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, styled, tight_row, tipped
 from cosmic.frame.gui.quantity_field import QuantityField
@@ -192,9 +192,7 @@ class ToolPanel(QWidget):
             named(push_button("■", "Stop this tool; the others go on"), "stopAxis"), "narrow"
         )
         self.stop.clicked.connect(self._on_halt)
-        self.poses = named(tipped(QComboBox(), "Named poses"), "toolPoses")
-        self.poses.setMinimumWidth(7 * STEP_PX)
-        self.poses.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.poses = PoseChoice(self._mico)
         self.go_pose = named(push_button("Go", "Move to the pose, all its axes together"), "goPose")
         styled(self.go_pose, "narrow")
         self.keep = styled(push_button("Keep", "Keep where this tool stands as a pose"), "narrow")
@@ -505,12 +503,8 @@ class ToolPanel(QWidget):
 
     def refresh_poses(self) -> None:
         """Show the poses there are now."""
-        names, chosen = list(self._mico.poses.names), self.poses.currentText()
-        self.poses.clear()
-        self.poses.addItems(names)
-        if chosen in names:
-            self.poses.setCurrentText(chosen)
-        self.go_pose.setEnabled(bool(names))
+        self.poses.refresh()
+        self.go_pose.setEnabled(self.poses.count() > 0)
 
     def _on_go_pose(self) -> None:
         try:

@@ -27,6 +27,7 @@ from cosmic.app.results.sessions import SessionFolder
 from cosmic.app.rig import Rig
 from cosmic.app.windows.alarm_watch import AlarmWatch, Quantity, computer_quantities
 from cosmic.app.windows.fibre_menu import FibreOperations
+from cosmic.app.windows.lens_start import LensStart
 from cosmic.app.windows.picture_move import PictureMove
 from cosmic.app.windows.stage import SCENE_TITLE, Stage, column_of
 from cosmic.frame.failure import Failure
@@ -61,6 +62,7 @@ MEASURE: Final = "Measure"
 
 _LEFT: Final = Area.LeftDockWidgetArea
 _RIGHT: Final = Area.RightDockWidgetArea
+_FORMULA: Final = "force/calculated"
 _COACH_PX: Final = 17 * STEP_PX
 WATCH_MS: Final = 500
 
@@ -187,6 +189,7 @@ class TaskLayout(QObject):
         window.use_workspaces(workspaces(others), self.stage)
         self._add_drawer()
         self._settings = settings
+        self._lens_start = LensStart(rig, self)
         self._connect()
 
     def _add_panels(self) -> None:
@@ -251,6 +254,9 @@ class TaskLayout(QObject):
     def shut_down(self) -> None:
         """End what goes on here; before the window goes."""
         self._watch.stop()
+        if self.force is not None:
+            calculation = self.force.calculated.calculation
+            self._settings.setValue(_FORMULA, calculation.formula if calculation else "")
         self.results.shut_down()
         if self._log is not None:
             self._log.close()
@@ -277,6 +283,10 @@ class TaskLayout(QObject):
             made.chosen.connect(self._on_workspace)
         if self.force is not None:
             self.force.written.connect(self._on_written)
+            self.force.calculate(str(self._settings.value(_FORMULA, "")))
+            self.force.by_time.click()  # the force itself is what is looked at first
+        self._gui.initialisation_begun.connect(self._lens_start.begin)
+        self._lens_start.said.connect(window.drawer.line.set_text)
         self._watch = QTimer(self, interval=WATCH_MS)
         self._watch.timeout.connect(self.watch)
         self._watch.start()

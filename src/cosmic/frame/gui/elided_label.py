@@ -24,13 +24,21 @@ class ElidedLabel(QLabel):
         super().__init__(parent)
         self._hint = hint
         self._whole: str | None = None
+        self._shorter: tuple[str, ...] = ()
         self._dim = False
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.set_text(text)
 
-    def set_text(self, text: str) -> None:
-        """Show `text`; line ends become spaces, the tooltip has them all."""
+    def set_text(self, text: str, *shorter: str) -> None:
+        """Show `text`; line ends become spaces, the tooltip has them all.
+
+        Of `shorter` the first that has room is shown where the whole has none: a number that is
+        cut off is another number.
+        """
+        if shorter != self._shorter:
+            self._shorter = shorter
+            self.update()
         if text == self._whole:  # cards repeat their line at every state that comes
             return
         self._whole = text
@@ -63,9 +71,7 @@ class ElidedLabel(QLabel):
             style = self.style()
             style.drawPrimitive(QStyle.PrimitiveElement.PE_Widget, option, painter, self)
             room = self.contentsRect()
-            text = QFontMetrics(self.font()).elidedText(
-                self.text(), Qt.TextElideMode.ElideRight, room.width()
-            )
+            text = self._fitting(room.width())
             if self._dim:
                 painter.setPen(QColor(current_palette().dim))
             style.drawItemText(
@@ -77,6 +83,19 @@ class ElidedLabel(QLabel):
                 text,
                 QPalette.ColorRole.NoRole if self._dim else self.foregroundRole(),
             )
+
+    def _fitting(self, room_px: int) -> str:
+        """Return what is written into so much room."""
+        metrics = QFontMetrics(self.font())
+        texts = (self.text(), *self._shorter)
+        fits = (each for each in texts if metrics.horizontalAdvance(each) <= room_px)
+        last = metrics.elidedText(texts[-1], Qt.TextElideMode.ElideRight, room_px)
+        return next(fits, last)
+
+    @property
+    def shown_text(self) -> str:
+        """What is written in the room there is."""
+        return self._fitting(self.contentsRect().width())
 
     @override
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:

@@ -138,8 +138,8 @@ def apply_theme(app: QApplication, name: ThemeName) -> None:
     if name not in _PALETTES:
         raise ValueError(f"there is no theme {name!r}; there are {', '.join(_PALETTES)}")
     app.setProperty(_PROPERTY, name)
-    if app.style().name().lower() != "fusion":
-        app.setStyle("Fusion")
+    if not app.styleSheet() and app.style().name().lower() != "fusion":
+        app.setStyle("Fusion")  # under a sheet it is, and has no name; again costs half a second
     if app.font() != ui_font():
         app.setFont(ui_font())
     app.setPalette(_qt_palette(_PALETTES[name]))

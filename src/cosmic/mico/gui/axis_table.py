@@ -124,7 +124,8 @@ class AxisRow(QObject):
         self._show_line()
 
     def _show_line(self) -> None:
-        self.line.set_text(self.card.status_text)
+        text = self.card.status_text
+        self.line.set_text(text, *_shorter(text))
 
     # Commanding
 
@@ -223,3 +224,11 @@ class AxisTable(QWidget):
         self._body.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._body.show()
         return tuple(self._rows.values())
+
+
+def _shorter(text: str) -> tuple[str, ...]:
+    """Return what a narrow window says in place of the usual lines; others are elided."""
+    if text.endswith(" travel"):
+        span = text.removesuffix(" travel")
+        return span, span.split(" ")[0]
+    return ("no sensor",) if text.startswith("no sensor") else ()

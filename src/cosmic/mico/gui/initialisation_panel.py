@@ -46,11 +46,14 @@ class InitialisationPanel(QWidget):
     -------
     refused(str)
         It could not be begun; the text says why.
+    begun()
+        It was begun.
     doubted(object)
         It was not begun, as something may be held or touched; a tuple of reasons.
     """
 
     refused = Signal(str)
+    begun = Signal()
     doubted = Signal(object)
 
     def __init__(self, mico: Mico, parent: QWidget | None = None) -> None:
@@ -169,6 +172,7 @@ class InitialisationPanel(QWidget):
             self.refused.emit(str(exc))
             return
         self._task, self._asker = task, asker
+        self.begun.emit()
 
     def _is_over(self) -> bool:
         task = self._application.running_task

@@ -79,6 +79,8 @@ class MicoWidget(QWidget):
 
     Signals
     -------
+    initialisation_begun()
+        The initialisation sequence was begun here.
     failure_changed(str)
         Why MiCo cannot work; empty when it can.
     refreshed()
@@ -91,6 +93,7 @@ class MicoWidget(QWidget):
         Something stands in the way of a move, while detours are planned.
     """
 
+    initialisation_begun = Signal()
     failure_changed = Signal(str)
     refreshed = Signal()
     verdict_given = Signal(object)
@@ -138,6 +141,7 @@ class MicoWidget(QWidget):
         self._header.rescan_requested.connect(self.rescan)
         self._header.undo_requested.connect(self._undoing.undo)
         self._header.steps_toggled.connect(self._on_steps_toggled)
+        self._steps.begun.connect(self.initialisation_begun)
         self._steps.refused.connect(self._on_refused)
         self._steps.doubted.connect(self._on_initialisation_doubted)
         self._undoing.planned.connect(self.undo_planned)

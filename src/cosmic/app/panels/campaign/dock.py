@@ -1,22 +1,31 @@
 """The panel of campaigns in the operator window, and what joins it to the scene."""
 
+import sys
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Final
 
-from PySide6.QtCore import QObject, QStandardPaths, Signal
+from PySide6.QtCore import QObject, QStandardPaths, QTimer, Signal
 
 from cosmic.app.panels.scene import ScenePanel
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.late_panel import LatePanel
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.server_gui import CosmicServerGui
+from cosmic.frame.job_queue import JobQueue
+from cosmic.frame.operation import Operation
 
 if TYPE_CHECKING:
     from cosmic.app.panels.campaign.panel import CampaignPanel
     from cosmic.autonomy.campaign.records import FibreRecord
 
 CAMPAIGN: Final = "Campaign"
+PANEL: Final = "cosmic.app.panels.campaign.panel"
+LOAD_AFTER_MS: Final = 5000
+"""The window is usable by then; the panel opens at once afterwards."""
 
 
 class CampaignDock(QObject):
@@ -57,6 +66,9 @@ class CampaignDock(QObject):
         self._policy = policy
         self._late: LatePanel[CampaignPanel] = LatePanel(self._made)
         window.add_panel(CAMPAIGN, self._late, scroll=False, beside=beside, tabbed=True)
+        self._loading: JobQueue | None = None
+        self._loaded = Relay(self._on_loaded)
+        QTimer.singleShot(LOAD_AFTER_MS, self, self._load)
 
     @property
     def panel(self) -> "CampaignPanel":
@@ -79,8 +91,25 @@ class CampaignDock(QObject):
         campaign = panel.campaign if panel is not None else None
         return campaign is not None and not campaign.over
 
+    def _load(self) -> None:
+        """Load statistics and all that the panel needs while nobody waits for it."""
+        if PANEL in sys.modules:
+            return
+        self._loading = JobQueue("campaign panel", self._policy)
+        self._loading.submit(lambda: import_module(PANEL), "the panel").add_callback(self._loaded)
+
+    def _on_loaded(self, _loaded: Operation[ModuleType]) -> None:
+        loading, self._loading = self._loading, None
+        if loading is not None:
+            loading.request_end()
+            loading.join()
+
     def shut_down(self) -> None:
         """End what runs; what it did is kept."""
+        if self._loading is not None:
+            self._loading.request_end()
+            self._loading.join()
+            self._loading = None
         if self._late.made is not None:
             self._replay.stop()
             self._late.made.shut_down()

@@ -14,7 +14,7 @@ from cosmic.app.panels.campaign.fibre_card import FibreCard
 from cosmic.app.panels.campaign.output import write_output
 from cosmic.app.panels.procedure import ProcedurePort, ProcedureTreePanel
 from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
-from cosmic.autonomy.campaign.recipe import Recipe, shipped_recipes
+from cosmic.autonomy.campaign.recipe import Recipe, load_recipe, shipped_recipes
 from cosmic.autonomy.campaign.records import FibreRecord
 from cosmic.autonomy.campaign.snapshot import card_of, snapshot_of
 from cosmic.autonomy.campaign.store_read import CampaignReader
@@ -182,6 +182,8 @@ class CampaignPanel(QWidget):
         self.plate = named(
             push_button("Plate is there", "Confirm the plate that is asked for"), "plateIsThere"
         )
+        self.about = named(ElidedLabel(), "campaignAbout")
+        self.about.set_dim(True)
         self.message = named(ElidedLabel(), "campaignMessage")
         self.procedure = ProcedureTreePanel(self._make_run, self._go_on)
         self.board = CampaignBoard()
@@ -202,6 +204,7 @@ class CampaignPanel(QWidget):
         whole.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, 0)
         whole.setSpacing(STEP_PX)
         whole.addWidget(head)
+        whole.addWidget(self.about)
         whole.addWidget(self.folder)
         whole.addWidget(self.message)
         whole.addWidget(self.tabs, 1)
@@ -240,8 +243,16 @@ class CampaignPanel(QWidget):
         self._suggest_folder()
 
     def _suggest_folder(self) -> None:
+        self._show_about()
         name = Path(self.recipe.currentText()).stem
         self.folder.setText(str(self._home / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"))
+
+    def _show_about(self) -> None:
+        """Say what the chosen recipe does, or what is wrong with it."""
+        try:
+            self.about.set_text(load_recipe(Path(self.recipe.currentText())).file.description)
+        except CosmicError as exc:
+            self.about.set_text(str(exc))
 
     def _on_choose(self) -> None:
         ask_directory(self, "Output folder", str(self._home), self.folder.setText)
@@ -250,6 +261,9 @@ class CampaignPanel(QWidget):
 
     def _make_run(self) -> ProcedurePort:
         """Return a campaign that is ready to begin; the tree shows why there is none."""
+        before = self._campaign
+        if before is not None and before.unfinished and not self.folder.isModified():
+            self._suggest_folder()  # Resume goes on in that of before; this one is new
         return self._opened(Path(self.recipe.currentText()), Path(self.folder.text()))
 
     def _go_on(self) -> ProcedurePort:
@@ -296,11 +310,11 @@ class CampaignPanel(QWidget):
                 reason=campaign.end_reason,
             )
         )
-        if campaign.over and not self.folder.isModified():
+        if campaign.over and not campaign.unfinished and not self.folder.isModified():
             self._suggest_folder()
         if campaign.unfinished and not self.message.toolTip():
             self.message.set_text(
-                f"Resume goes on in {campaign.store.folder.name}; Start begins a new one"
+                f"Resume goes on in {campaign.store.folder.name}; Start begins a new one beside it"
             )
             self.message.show()
 

@@ -89,7 +89,7 @@ class ResultViewer(QWidget):
         self.show_timelines(())
 
     def _make_widgets(self) -> None:
-        self.facts = named(ElidedLabel("Choose a recording"), "resultsFacts")
+        self.facts = named(ElidedLabel(), "resultsFacts")
         self.slope = named(QLabel(), "resultsSlope")
         self.slope.setFont(number_font())
         self.slope.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -232,7 +232,7 @@ class ResultViewer(QWidget):
 
     def _show_facts(self) -> None:
         if not self._timelines:
-            self.facts.set_text("Choose a recording")
+            self.facts.set_text("Choose a recording; Record in Measure makes one")
             return
         first = self._timelines[0]
         words = [f"{first.path.stem}: {duration_text(first.end_s - first.start_s)}"]

@@ -37,6 +37,8 @@ from cosmic.mico.gui.scene.view import SceneView
 
 _TITLES: Final = {TOP: "Top", FRONT: "Front", SIDE: "Side"}
 _AXIS_PX: Final = 28
+_INSET_PX: Final = 40 * STEP_PX
+"""In less width there is one picture, from above, without rulers: two are too small to read."""
 
 
 @dataclass(frozen=True)
@@ -127,9 +129,18 @@ class ProjectionView(SceneView):
         self._upright = SIDE if abs(sight.azimuth_deg) < 45.0 else FRONT
         self.refresh()
 
-    def panels(self) -> tuple[Panel, Panel]:
-        """Return the two pictures as they lie on the widget now."""
+    @property
+    def small(self) -> bool:
+        """There is room for one picture only."""
+        return self.width() < _INSET_PX
+
+    def panels(self) -> tuple[Panel, ...]:
+        """Return the two pictures as they lie on the widget now; the one where that is small."""
         width, height = float(self.width()), float(self.height())
+        if self.small:
+            px_mm = min(width, height) / 2.0 / self._sight.radius_mm
+            box = QRectF(0, 0, width, height)
+            return (Panel(TOP, box, self._sight.centre_mm, px_mm, self._sight.cut_mm),)
         if width > 1.2 * height:
             half = (width - STEP_PX) / 2.0
             boxes = QRectF(0, 0, half, height), QRectF(half + STEP_PX, 0, half, height)
@@ -159,8 +170,8 @@ class ProjectionView(SceneView):
                 with saved(painter):
                     painter.setClipRect(panel.box)
                     draw_annotations(painter, self.content, panel.project, palette)
-                    _draw_title(painter, panel, palette)
-            notes = [f"{self._reason}: projections"] if self._reason else []
+                    _draw_title(painter, panel, palette, short=self.small)
+            notes = [f"{self._reason}: projections"] if self._reason and not self.small else []
             room = panels[0].box.adjusted(0, 2.5 * STEP_PX, 0, 0)
             draw_legend(painter, self.content, room, palette, notes)
             self.draw_hovered(painter, palette)
@@ -170,7 +181,7 @@ class ProjectionView(SceneView):
         self._image = None
         super().resizeEvent(event)
 
-    def _drawn(self, panels: tuple[Panel, Panel], palette: Palette) -> QPixmap:
+    def _drawn(self, panels: tuple[Panel, ...], palette: Palette) -> QPixmap:
         """Return rulers and bodies as they are now: kept, for they take most of the time."""
         ratio = self.devicePixelRatioF()
         image = QPixmap(self.size() * ratio)
@@ -180,7 +191,8 @@ class ProjectionView(SceneView):
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             for panel in panels:
                 painter.fillRect(panel.box, QColor(palette.window))
-                _draw_rulers(painter, panel, palette)
+                if not self.small:
+                    _draw_rulers(painter, panel, palette)
                 with saved(painter):
                     painter.setClipRect(panel.box)
                     self._draw_bodies(painter, panel, palette)
@@ -275,11 +287,11 @@ def _pen(colour: str, width: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) 
     return pen
 
 
-def _draw_title(painter: QPainter, panel: Panel, palette: Palette) -> None:
+def _draw_title(painter: QPainter, panel: Panel, palette: Palette, *, short: bool) -> None:
     painter.setFont(ui_font(12, bold=True))
     axes = ", ".join("xyz"[number] for number in panel.plane[:2])
     box = panel.box.adjusted(STEP_PX, STEP_PX / 2, -STEP_PX, 0)
-    text = f"{_TITLES[panel.plane]}  {axes} in mm"
+    text = _TITLES[panel.plane] if short else f"{_TITLES[panel.plane]}  {axes} in mm"
     draw_ground(painter, painter.boundingRect(box, Qt.AlignmentFlag.AlignLeft, text), palette)
     painter.drawText(box, Qt.AlignmentFlag.AlignLeft, text)
 
@@ -294,7 +306,7 @@ def _draw_rulers(painter: QPainter, panel: Panel, palette: Palette) -> None:
         first, last = np.ceil((centre - half) / step), np.floor((centre + half) / step)
         for number in np.arange(first, last + 1):
             shift = (number * step - centre) * panel.px_mm
-            text = f"{number * step:.6g}"
+            text = f"{number * step + 0.0:.6g}"  # never -0
             painter.setPen(QPen(QColor(palette.border), 1.0))
             if across:
                 x = middle.x() + shift
