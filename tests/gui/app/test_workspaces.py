@@ -140,6 +140,16 @@ def scrolled(window: QWidget) -> list[str]:
     ]
 
 
+def settled(qtbot: QtBot, look: Callable[[], list[str]]) -> list[str]:
+    """Return what is wrong once the layout has settled: on a busy computer that takes a while."""
+    for _ in range(30):
+        found = look()
+        if not found:
+            return []
+        qtbot.wait(100)
+    return found
+
+
 @pytest.mark.parametrize("size", SIZES.values(), ids=SIZES)
 @pytest.mark.parametrize("theme", ["dark", pytest.param("light", marks=pytest.mark.slow)])
 def test_the_picture_has_most_of_the_window_and_nothing_is_cut_off(
@@ -152,10 +162,10 @@ def test_the_picture_has_most_of_the_window_and_nothing_is_cut_off(
     for name in [each.name for each in window.workspaces.all]:
         choose(window, qtbot, name)
         assert (window.width(), window.height()) == size, name
-        assert clipped(window) == [], name
-        assert overlapping(window) == [], name
+        assert settled(qtbot, partial(clipped, window)) == [], name
+        assert settled(qtbot, partial(overlapping, window)) == [], name
         if name in (*WITH_PICTURE, SET_UP):
-            assert scrolled(window) == [], name
+            assert settled(qtbot, partial(scrolled, window)) == [], name
         if name in WITH_PICTURE:
             drawn = tasks(window).stage.picture_rect()
             share = drawn.width() * drawn.height() / (size[0] * size[1])

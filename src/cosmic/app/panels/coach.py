@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QSizePolicy, QVBoxLay
 from cosmic.frame.gui.build import named, push_button, styled, tight_row
 from cosmic.frame.gui.theme import STEP_PX
 
+MOST_LINES: Final = 7
 LOOK_MS: Final = 400
 _KEY: Final = "coach/off"
 
@@ -63,20 +64,19 @@ class Coach(QFrame):
         self.words = named(QLabel(), "coachWords")
         self.words.setWordWrap(True)
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
-        self.words.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.MinimumExpanding)
-        # Four lines have room, so that the button below does not move with most steps.
-        self.words.setMinimumHeight(4 * self.words.fontMetrics().lineSpacing())
+        self.words.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Expanding)
+        # No more, so that the button is below the words in a high panel, too, and stays there.
+        self.words.setMaximumHeight(MOST_LINES * self.words.fontMetrics().lineSpacing())
         self.button: QPushButton = named(push_button("", ""), "coachButton")
         self.button.clicked.connect(self._on_pressed)
         foot, row = tight_row(STEP_PX)
-        row.addWidget(self.button, 1)
-        row.addWidget(self.off)
+        row.addWidget(self.button, 1, Qt.AlignmentFlag.AlignTop)
+        row.addWidget(self.off, 0, Qt.AlignmentFlag.AlignTop)
         column = QVBoxLayout(self)
         column.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX // 2)
         column.setSpacing(STEP_PX // 2)
-        column.addWidget(self.words)
+        column.addWidget(self.words, 1)
         column.addWidget(foot)
-        column.addStretch(1)
         kept = self.button.sizePolicy()
         kept.setRetainSizeWhenHidden(True)
         self.button.setSizePolicy(kept)

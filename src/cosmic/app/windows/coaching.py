@@ -161,13 +161,18 @@ class _Rules:
             holder = operations.handling.held_by
             text = f"The {holder} gripper holds a fibre. {request.title} comes next."
             return Step(text, request.title, lambda: operations.begin(request))
-        if spaces.current != "Handle" or operations.used:
+        if spaces.current != "Handle":
+            return None
+        if operations.failed:
+            text = f"{operations.failed} did not succeed; its card says why. Right-click a fibre "
+            return Step(text + "outlined in green to try again.")
+        if operations.worked:
             return None
         view = self._parts.stage.camera
         if not operations.finding(view):
             text = "To take a fibre, have the fibres found, then right-click one in the image."
             return Step(text, "Find fibres", lambda: operations.find(view, on=True))
-        return Step("Right-click a fibre in the image to take it with a gripper.")
+        return Step("Right-click a fibre outlined in green to take it with a gripper.")
 
     def task(self) -> Step | None:
         """Propose what the workspace in front is for."""
@@ -204,10 +209,10 @@ class _Rules:
             return Step(text, "Handle", self._go("Handle"))
         if problem:
             text = (
-                "Click-to-move needs a calibration: Calibrate in the column at the left moves a "
-                "tool and finds it in the image."
+                "To take a fibre, go on to Handle. Click-to-move needs a calibration: Calibrate, "
+                "at the left, moves a tool and finds it in the image."
             )
-            return Step(text)
+            return Step(text, "Handle", self._go("Handle"))
         return Step("The image is calibrated. Choose a tool next.", "Handle", self._go("Handle"))
 
     def _handle(self) -> Step:

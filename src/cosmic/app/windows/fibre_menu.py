@@ -73,6 +73,7 @@ class FibreOperations(QObject):
         stage.set_card(self.card)
         self._relay: Relay[()] | None = None
         self._shown: object = None
+        self._worked = False
         self._cameras, self._found_on = list(cameras), list[CameraView]()
         self.marked: MarkedFibre | None = None
         self.offered: Callable[[], RecordedProcedure | None] = _nothing
@@ -106,6 +107,17 @@ class FibreOperations(QObject):
     def used(self) -> bool:
         """True once an operation was asked for: what carries them out is loaded."""
         return self._relay is not None
+
+    @property
+    def worked(self) -> bool:
+        """True once an operation has begun."""
+        return self._worked
+
+    @property
+    def failed(self) -> str:
+        """Title of the operation that ended last, where it did not do what it should."""
+        result = self.handling.result if self.used and not self.running else None
+        return "" if result is None or result.good else result.title
 
     # The menu
 
@@ -211,6 +223,7 @@ class FibreOperations(QObject):
         self._found_on = [view for view in self._cameras if self.finding(view)]
         for view in self._found_on:  # what an operation looks for, it finds by itself
             self.find(view, on=False)
+        self._worked = True
         self.card.follow(title, run)
         run.start()
         self.began.emit(title)

@@ -313,8 +313,9 @@ class FibreHandling:
         try:
             work = self.context(gripper)
             approach = approach_to(work, marked)
-        except CosmicError as exc:
-            return OperationPreview(f"{gripper} is calibrated first: {exc}")
+        except CosmicError:
+            words = f"The {gripper} gripper is calibrated first, for about a minute"
+            return OperationPreview(f"{words}; then it takes this fibre.")
         if approach is None:
             return OperationPreview(f"{gripper} cannot reach this fibre at any angle of the table.")
         now = positions_of(work.mico.states())
