@@ -330,6 +330,8 @@ def _take(scene: Scene, operations: FibreOperations) -> None:
     scene.save("tour-take", menu)
     menu.close()
     take.trigger()
+    scene.wait(5.0)
+    scene.save("tour-running")
 
 
 def tour(scene: Scene) -> None:
