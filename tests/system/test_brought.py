@@ -208,7 +208,7 @@ def test_its_algorithm_is_in_the_chain_of_the_camera_that_names_it(laboratory: E
         image = rig.vico.snap()
         chain = rig.vico.application.unit(rig.vico.cameras[0]).chain
         states = [each.name for each in chain.states]
-        assert states[-2:] == ["brightness", "broken"]
+        assert {"brightness", "broken"} <= set(states)
         assert image.mean() > 0
 
 

@@ -1,7 +1,8 @@
 """What a camera's view shows of its recordings and of machine vision."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Self
 
 from cosmic.frame.errors import CosmicError
@@ -58,12 +59,20 @@ class FormatShown:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """What the chain found on one image."""
+    """What the chain found on one image.
+
+    Attributes
+    ----------
+    results : mapping of str to object
+        What every algorithm found, by its name, those of other packages too; empty where the
+        camera is at a station.
+    """
 
     image: CameraImage
     fibres: tuple["Fibre", ...]
     tips: tuple[TipSeen, ...]
     held: tuple[HeldSeen, ...] = ()
+    results: Mapping[str, object] = field(default_factory=dict)
     picture = Renamed("image")
 
     @classmethod
@@ -78,6 +87,7 @@ class Seen:
             if isinstance(tips, tuple)
             else (),
             _held(held) if isinstance(held, Mapping) else (),
+            MappingProxyType(dict(newest.results)),
         )
 
 
