@@ -37,7 +37,7 @@ from cosmic.mico.api.entry import (
 )
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.news import SentMotion
-from cosmic.mico.api.plan_movable import PlanAxis, PlanMovable
+from cosmic.mico.api.plan_movable import PlanMovable
 from cosmic.mico.api.remote_axis import RemoteAxisState
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.motion.device_commander import DeviceCommander
@@ -94,11 +94,6 @@ class Axis(PlanMovable, Declared):
         return self._name
 
     @property
-    @override
-    def _axis(self) -> PlanAxis:
-        return self
-
-    @property
     def far(self) -> RemoteAxisState | None:
         """What is known here where the axis is at another station; None where it is here."""
         return self._far
@@ -118,6 +113,7 @@ class Axis(PlanMovable, Declared):
     # What is known
 
     @property
+    @override
     def details(self) -> PositionerState:
         """Everything known of it, frozen; positions in gate coordinates."""
         far = self._far
@@ -141,6 +137,7 @@ class Axis(PlanMovable, Declared):
 
     @property
     @state
+    @override
     def closed_loop_frequency_hz(self) -> int | None:
         """What limits the speed of movements to a position, as it was set last; None before."""
         found = self._manager.device(self._name).container.positioner(self._channel)
@@ -148,6 +145,7 @@ class Axis(PlanMovable, Declared):
 
     @property
     @state(fixed=True)
+    @override
     def controller(self) -> str:
         """Name of the library that drives it."""
         return self._manager.controller.name
@@ -316,6 +314,7 @@ class Axis(PlanMovable, Declared):
             changed = PositionChanged(state.name, state.position, state.unit)
             self.commander.position_changed.emit(changed)
 
+    @override
     def check(self, position: Number, *, consent: bool = False) -> MoveVerdict:
         """Return the gate's answer to `move_to(position)`, without moving."""
         try:
@@ -351,6 +350,7 @@ class Axis(PlanMovable, Declared):
         self, position: Number, *, wait: Literal[False], consent: bool = False
     ) -> Movement: ...
 
+    @override
     def move_to(
         self, position: Number, *, wait: bool = True, consent: bool = False
     ) -> float | Movement | None:
@@ -645,6 +645,7 @@ class Axis(PlanMovable, Declared):
         return self.send(motion, consent=consent)
 
     @command(at_once=True)
+    @override
     def halt(self, why: str = "stopped") -> None:
         """Stop this axis; nothing is latched and other axes go on."""
         self._manager.device(self._name).halt(self._channel, one_line(why))
@@ -703,6 +704,7 @@ class Axis(PlanMovable, Declared):
         """Say where an axis without sensor stands, in gate coordinates; see `set_estimate`."""
         self._manager.device(self._name).set_estimate(self._channel, position, std)
 
+    @override
     def set_closed_loop_frequency(self, frequency_hz: Number) -> None:
         """Limit the speed of movements to a position, of an SCU 1 to 18500 Hz.
 

@@ -4,7 +4,7 @@ import inspect
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any, Final, Literal, Protocol
+from typing import Any, Final, Literal
 
 from typing_extensions import override
 
@@ -34,8 +34,26 @@ IN_FORCE_S: Final = 1.0
 STANDS_AT: Final = {"um": 1.0, "deg": 0.1}
 
 
-class PlanAxis(Protocol):
-    """What of an axis its shape is made of."""
+@checked_class
+class PlanMovable(PlanSignal):
+    """Movable, Readable, Subscribable, Configurable, Locatable, Stoppable and Checkable.
+
+    Without bluesky. Plans can monitor it, and suspenders watch its position. What is abstract here
+    is what all of that is made of.
+    """
+
+    parent: None = None
+    _asked: tuple[float, MoveStatus] | None = None
+
+    @property
+    @abstractmethod
+    def key(self) -> str:
+        """What `rig.mico`, the platform file and verdicts call it, such as "left.x"."""
+
+    @property
+    def name(self) -> str:
+        """Name in documents of bluesky, which forbid the dot, and in EPICS, such as "left_x"."""
+        return plain_name(self.key)
 
     @property
     @abstractmethod
@@ -68,53 +86,23 @@ class PlanAxis(Protocol):
     def set_closed_loop_frequency(self, frequency_hz: Number) -> None:
         """Limit the speed of movements to a position."""
 
-
-@checked_class
-class PlanMovable(PlanSignal):
-    """Movable, Readable, Subscribable, Configurable, Locatable, Stoppable and Checkable.
-
-    Without bluesky. Plans can monitor it, and suspenders watch its position.
-    """
-
-    parent: None = None
-    _asked: tuple[float, MoveStatus] | None = None
-
-    @property
-    @abstractmethod
-    def key(self) -> str:
-        """What `rig.mico`, the platform file and verdicts call it, such as "left.x"."""
-
-    @property
-    def name(self) -> str:
-        """Name in documents of bluesky, which forbid the dot, and in EPICS, such as "left_x"."""
-        return plain_name(self.key)
-
-    @property
-    @abstractmethod
-    def _axis(self) -> PlanAxis:
-        """What moves."""
-
     @abstractmethod
     def _on_state(self, callback: Callable[[PositionerState], object]) -> Unsubscribe:
         """Call `callback(state)` after each change."""
 
-    @property
-    def _now(self) -> PositionerState:
-        return self._axis.details
-
     def check_value(self, value: Number) -> None:
         """Raise `MoveRefused` where `move_to(value)` would; for bluesky's check_limits."""
-        verdict = self._axis.check(value)
+        verdict = self.check(value)
         if not verdict.allowed:
             raise refusal(verdict)
 
     def set(self, value: Number) -> MoveStatus:
         """Start to move to `value` and return a bluesky status; a refusal is how it fails."""
-        state = self._now
+        state = self.details
         what = f"{state.name} to {value}"
         try:
             target = as_number(value, state.unit, state.name) + state.zero
-            status = MoveStatus(what, self._axis.move_to(value, wait=False))
+            status = MoveStatus(what, self.move_to(value, wait=False))
         except CosmicError as exc:
             return refused(what, exc)
         self._asked = target, status
@@ -128,14 +116,14 @@ class PlanMovable(PlanSignal):
         """
         if success is True and self._asked is not None:  # whatever it is, this stops
             self._asked[1].finish()
-        self._axis.halt()
+        self.halt()
 
     def locate(self) -> dict[str, float | None]:
         """Return where it is and where a plan last sent it, as bluesky's Location.
 
         The setpoint is where it is, once something else has moved it.
         """
-        state = self._now
+        state = self.details
         here, setpoint = state.shown_position, state.shown_position
         if self._asked is not None:
             target, status = self._asked
@@ -148,7 +136,7 @@ class PlanMovable(PlanSignal):
 
     def read(self) -> Readings:
         """Return the position as a bluesky reading; NaN before the first."""
-        state = self._now
+        state = self.details
         here = state.shown_position
         when_s = unix_of_wall_s(state.read_wall_s) if here is not None else unix_now_s()
         return {
@@ -157,13 +145,13 @@ class PlanMovable(PlanSignal):
 
     def describe(self) -> DataKeys:
         """Return what `read` returns, in bluesky's terms."""
-        return {self.name: number_key(self._source, self._now.unit)}
+        return {self.name: number_key(self._source, self.details.unit)}
 
     def read_configuration(self) -> Readings:
         """Return zero, soft limits, how well the position is known, and what limits the speed."""
-        state, now_s = self._now, unix_now_s()
+        state, now_s = self.details, unix_now_s()
         low, high = state.shown_limits or (math.nan, math.nan)
-        frequency_hz = self._axis.closed_loop_frequency_hz
+        frequency_hz = self.closed_loop_frequency_hz
         values = {
             "zero": state.zero,
             "low_limit": low,
@@ -178,7 +166,7 @@ class PlanMovable(PlanSignal):
 
     def describe_configuration(self) -> DataKeys:
         """Return what `read_configuration` returns, in bluesky's terms."""
-        unit, source = self._now.unit, self._source
+        unit, source = self.details.unit, self._source
         keys: DataKeys = {
             f"{self.name}_{key}": number_key(source, unit)
             for key in ("zero", "low_limit", "high_limit")
@@ -204,11 +192,11 @@ class PlanMovable(PlanSignal):
         return configure(self, settings, {"frequency_hz": self._set_frequency})
 
     def _set_frequency(self, frequency_hz: Number) -> None:
-        self._axis.set_closed_loop_frequency(frequency_hz)
-        wanted, until_s = as_whole(frequency_hz, "Hz", self._now.name), WALL.now_s() + IN_FORCE_S
-        while self._axis.closed_loop_frequency_hz != wanted:
+        self.set_closed_loop_frequency(frequency_hz)
+        wanted, until_s = as_whole(frequency_hz, "Hz", self.details.name), WALL.now_s() + IN_FORCE_S
+        while self.closed_loop_frequency_hz != wanted:
             if WALL.now_s() > until_s:
-                raise DeviceTimeout(f"{self._now.name}: {wanted} Hz is not in force yet")
+                raise DeviceTimeout(f"{self.details.name}: {wanted} Hz is not in force yet")
             WALL.sleep(0.005)
 
     @property
@@ -218,14 +206,14 @@ class PlanMovable(PlanSignal):
 
     @property
     def _source(self) -> str:
-        return f"{self._axis.controller}:{self._now.name}"
+        return f"{self.controller}:{self.details.name}"
 
     # What a plan or a script follows
 
     @override
     def get(self) -> float:
         """Return the position; NaN before the first."""
-        here = self._now.shown_position
+        here = self.details.shown_position
         return math.nan if here is None else here
 
     @override
