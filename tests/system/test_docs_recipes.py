@@ -13,6 +13,7 @@ from cosmic.autonomy.campaign.opening import read_recipe
 from cosmic.autonomy.campaign.recipe import (
     ClimateSettings,
     OutputSettings,
+    PlateSettings,
     RecipeFile,
     SampleSettings,
     SensorSettings,
@@ -31,6 +32,7 @@ PAGE: Final = ROOT / "docs" / "reference" / "recipes.md"
 TABLES: Final[dict[str, type[BaseModel]]] = {
     "[sample]": SampleSettings,
     "[stop]": StopSettings,
+    "[plates]": PlateSettings,
     "[output]": OutputSettings,
     "[climate]": ClimateSettings,
     "[sensor]": SensorSettings,
