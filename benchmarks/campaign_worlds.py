@@ -15,6 +15,7 @@ A contact of jaw and plate counts as not intended where it is deeper than the wo
 """
 
 import argparse
+import math
 import random
 import shutil
 import statistics
@@ -34,6 +35,9 @@ import tomlkit
 import cosmic
 from benchmarks.campaign import RECIPE, Run
 from benchmarks.figures import Figure, percentile, table
+from cosmic.autonomy.bending.fit import half_width_percent
+from cosmic.autonomy.bending.result import BendingResult
+from cosmic.autonomy.campaign.records import FibreRecord
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.handling.plate import Candidate, Jaws, Neighbours, PlateFrame, reaches
 from cosmic.autonomy.handling.settings import GraspSettings
@@ -42,12 +46,19 @@ from cosmic.twin.centre_line import CentreLine
 from cosmic.twin.truth import TrueFibre, TruthRecord, read_truth
 
 NAME = "campaign_worlds"
+STANDARD = """
+[parameters.standard]
+ei_n_m2 = 1.79e-10
+expanded_percent = 2.0
+"""
+"""What the certificate of the glass fibre says that lies on the plates of these worlds."""
 CONFIG = Path(cosmic.__file__).parents[2] / "config"
 LAB = ("friendly", "realistic", "harsh")
 WORLDS = ("plain", *LAB, "mixture 1", "mixture 2")
 RATE = 20.0
 """Faster, the platform's own times become coarse: who waits goes on 2 ms of the wall late."""
 LIMIT_S = 3600.0
+WIDEST_PERCENT = 30.0
 SEEDS = (1, 2)
 DEPTH_UM = {"friendly": 1.0, "plain": 1.0}
 OTHER_DEPTH_UM = 3.0
@@ -83,6 +94,23 @@ class Scored:
     def graspable(self) -> set[int]:
         """The numbers of those that can be taken."""
         return graspable(self.run.truth)
+
+    @property
+    def values(self) -> list[tuple[BendingResult, float]]:
+        """What was measured of each fibre, and what is true of its longest span, N m2."""
+        pairs = ((each.bending, self._true_ei(each)) for each in self.run.tried)
+        return [(found, true) for found, true in pairs if found is not None and true is not None]
+
+    def _true_ei(self, record: FibreRecord) -> float | None:
+        fibre = self.run.true_of(record)
+        met = [
+            each.facts
+            for each in self.run.truth.of("touched", None if fibre is None else fibre.number)
+            if record.began_s <= each.time_s <= record.ended_s and "ei_n_m2" in each.facts
+        ]
+        if fibre is None or not met:
+            return None
+        return float(max(met, key=lambda facts: facts["abscissa_um"])["ei_n_m2"])
 
     @property
     def depths_um(self) -> list[float]:
@@ -139,6 +167,7 @@ def carry_out(world: str, seed: int, stop: str, folder: Path, *, procedure: str)
             (config / "worlds" / f"mixture-{number}.toml").write_text(text, encoding="utf-8")
     recipe, out, truth = folder / "all.toml", folder / f"{name}-{seed}", folder / f"{name}-{seed}.t"
     text = RECIPE.format(procedure=procedure, sample="forty-dry", stop=stop)
+    text += "" if world == "plain" else STANDARD
     recipe.write_text(text, encoding="utf-8")
     command = [sys.executable, "-m", "cosmic", "campaign", str(recipe), "--config", str(config)]
     command += ["--out", str(out), "--world", name]
@@ -194,6 +223,37 @@ def figures_of(world: str, scored: Sequence[Scored]) -> list[Figure]:
     ]
 
 
+def values_of(world: str, scored: Sequence[Scored]) -> list[Figure]:
+    """Return how far values may be believed, by the truth that each push is about."""
+    pairs = [pair for each in scored for pair in each.values]
+    good = [(found, true) for found, true in pairs if found.trusted]
+    right = [(found, true) for found, true in pairs if _inside(found, true)]
+    right = [pair for pair in right if half_width_percent(pair[0]) <= WIDEST_PERCENT]
+    halves = [half_width_percent(found) for found, _ in good]
+    errors = [100.0 * (found.ei_n_m2 / true - 1.0) for found, true in good]
+    off = sum(abs(error) > 2.0 * half for error, half in zip(errors, halves, strict=True))
+    none = [math.nan]
+
+    def figure(name: str, value: float, unit: str) -> Figure:
+        return Figure(NAME, f"{world}: {name}", value, unit)
+
+    return [
+        figure("good with the truth inside", sum(_inside(*each) for each in good), "fibres"),
+        figure("of so many whose truth is known", len(good), "fibres"),
+        figure("good and off by more than twice the half width", off, "fibres"),
+        figure("right values", len(right), "fibres"),
+        figure("thrown away", sum(not found.trusted for found, _ in right), "fibres"),
+        figure("half width of good ones, p50", percentile(halves or none, 50), "%"),
+        figure("error of good ones with its sign, p10", percentile(errors or none, 10), "%"),
+        figure("the same, p50", percentile(errors or none, 50), "%"),
+        figure("the same, p90", percentile(errors or none, 90), "%"),
+    ]
+
+
+def _inside(found: BendingResult, true_n_m2: float) -> bool:
+    return found.ei_low_n_m2 <= true_n_m2 <= found.ei_high_n_m2
+
+
 def causes(scored: Sequence[Scored]) -> Counter[str]:
     """Return why fibres that were tried are no good ones."""
     return Counter(
@@ -219,7 +279,7 @@ def measure(
             scored = [
                 carry_out(world, seed, stop, Path(folder), procedure=procedure) for seed in chosen
             ]
-        figures += figures_of(world, scored)
+        figures += [*figures_of(world, scored), *values_of(world, scored)]
         print(world, dict(causes(scored)), [each.run.end for each in scored], flush=True)
     return figures
 

@@ -30,7 +30,6 @@ from cosmic.autonomy.bending.plan import DRY_EI_N_M2, SpanLimits, guess_ei, plan
 from cosmic.autonomy.bending.result import BendingError, BendingResult, Floats
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
-from cosmic.autonomy.campaign.storage_format import COLUMNS
 from cosmic.frame.errors import CosmicError
 
 WORLDS: Final = ("friendly", "realistic", "harsh")
@@ -232,9 +231,12 @@ def _span(read: dict[str, Any], line: Floats, place_um: float) -> Span:
         nominal_um=place_um,
         probe_x_um=place_um,
         hold_x_um=0.0,
+        probe_um=np.array(read["way_um"], dtype=np.float64),
+        force_un=np.array(read["force_un"], dtype=np.float64),
+        force_std_un=np.array(read["force_std_un"], dtype=np.float64),
+        time_s=np.array(read["time_s"], dtype=np.float64),
         loading=np.array(read["loading"], dtype=np.bool_),
         shape=NaturalShape(line[:, 0], line[:, 1], place_um),
-        **{name: np.array(read[key], dtype=np.float64) for key, name in COLUMNS.items()},
     )
 
 

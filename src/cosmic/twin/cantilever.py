@@ -76,7 +76,7 @@ class Cantilever:
         Of the probe's edge and half the fibre together.
     friction : float
         Part of the normal force that acts along the fibre at the contact; positive pulls the
-        fibre outwards, as a probe does while the push grows.
+        fibre outwards.
     turn_rad_un_um : float
         By how much the clamp turns under a moment.
     side_un_um : float
@@ -114,13 +114,15 @@ class Cantilever:
         along = np.concatenate([[0.0], np.cumsum(steps)])
         self._s = np.concatenate([[-depth_um], along, [BEYOND * self._free_um]])
 
-    def curve(self, abscissa_um: float, *, sensor_un_um: float) -> PushCurve:
+    def curve(self, abscissa_um: float, *, sensor_un_um: float, stiffer: float = 1.0) -> PushCurve:
         """Return force over travel of a probe whose middle stands at an abscissa from the tip.
 
         Parameters
         ----------
         sensor_un_um : float
             Stiffness of the sensor behind the probe, which takes its part of the travel.
+        stiffer : float
+            So many times as stiff the fibre itself bends: something else holds it besides.
         """
         table = self._table
         length = max(abscissa_um + self._depth, math.exp(table.log_lengths[0]))
@@ -138,6 +140,8 @@ class Cantilever:
             last += 1
         last = max(last, 1)
         deflections[0] = forces[0] = alongs[0] = 0.0
+        deflections = deflections + (stiffer - 1.0) * forces / self._side
+        forces, alongs = stiffer * forces, stiffer * alongs
         return PushCurve(deflections[:last], forces[:last], sensor_un_um, alongs[:last])
 
     @cached_property

@@ -26,7 +26,7 @@ from cosmic.twin.rod import (
     held_at_both_ends,
     tension_un,
 )
-from cosmic.twin.rubbing import RubbedPush, Rubbing
+from cosmic.twin.rubbing import Askew, HeldPush, Lifting, Push, RubbedPush, Rubbing
 from cosmic.twin.section import Section
 from cosmic.twin.tools import Tool
 
@@ -54,6 +54,11 @@ MEASURED_AFTER_S: Final = 1.0
 """After a step: what a bending test is about changes with time."""
 
 MOST_CREEP: Final = 0.3
+COMPARED_PART: Final = 0.05
+"""Of the length to the probe: a push by which it is told which way the fibre is rubbed."""
+
+MOST_HELD: Final = 0.95
+"""Of what it gives way across: friction takes no more of it."""
 
 NOT_INELASTIC: Final = Inelastic(1.0, slope=0.0, yield_curvature=math.inf)
 
@@ -168,10 +173,11 @@ class Fibre:
         self.falls = 0
         self._contact = contact
         self._rubbing = Rubbing(contact.friction_turn_um)
+        self._lifting = Lifting()
         self._climate = climate
         self._section = Section(settings, self.key)
         self._solved: _Solved | None = None
-        self._curves: tuple[float, tuple[PushCurve, ...]] | None = None
+        self._curves: _Curves | None = None
         self._inelastic: Inelastic | None = None
         energy = handling.adhesion_un * math.exp(
             handling.adhesion_sigma_ln * random.Random(f"adhesion {self.key}").gauss(0.0, 1.0)
@@ -186,6 +192,7 @@ class Fibre:
         self.holds[tool.name] = make_hold(self.line_um, at_um, outwards, tool.towards, fate)
         self.carried = None
         self._solved = self._inelastic = None
+        self._lifting = Lifting()
 
     def lay(self, pose: PlatePose) -> None:
         """Put it on the plate."""
@@ -390,20 +397,31 @@ class Fibre:
         time_s: float,
         *,
         back_um: float = 0.0,
-    ) -> PushCurve | RubbedPush:
+        height_um: float = 0.0,
+    ) -> PushCurve | Push:
         """Return force over travel for a probe at an abscissa, which has come so far.
 
         Parameters
         ----------
         travel_um, back_um : float
             From where it would stand without the probe, and how far that is back by now.
+        height_um : float
+            How high above the probe it would stand without it.
         """
         (hold, *more) = self.holds.values()
         if line.free is not None:
             # What crept stands back: the contact itself does not slide while the probe stands.
             part = self._rubbing.follow(travel_um + back_um)
-            growing, *falling = self._held_at_one_end(hold, line.free, abscissa_um, probe, time_s)
-            return RubbedPush(growing, falling[0], part) if falling else growing
+            found = self._held_at_one_end(hold, line.free, abscissa_um, probe, time_s)
+            if found.askew is not None:
+                self._lifting.follow(
+                    lambda travel_um, held: found.push(part, held).force_un(travel_um),
+                    travel_um,
+                    back_um,
+                    height_um,
+                    found.askew,
+                )
+            return found.push(part, self._lifting.part)
         distance = _rounded(line.reach_um + hold.depth_um + more[0].depth_um)
         return held_at_both_ends(
             ei_un_um2=self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2,
@@ -421,8 +439,8 @@ class Fibre:
 
     def _held_at_one_end(
         self, hold: Hold, free: Free, abscissa_um: float, probe: "ProbeShape", time_s: float
-    ) -> tuple[PushCurve, ...]:
-        """Return the curve, or with friction those of a growing and of a falling push."""
+    ) -> "_Curves":
+        """Return the curves of all that friction may do."""
         solved, ei = self._solved, self.ei_un_um2(time_s)
         if (
             solved is None
@@ -433,31 +451,48 @@ class Fibre:
             solved = self._solved = self._solve(hold, free, probe, ei)
             self._curves = None
         place = _rounded(max(abscissa_um, NEAREST_UM))
-        if self._curves is None or self._curves[0] != place:
+        if self._curves is None or self._curves.place_um != place:
             shear = self._section.shear_um_un(
                 place + hold.depth_um, solved.thickness_um, solved.in_plane_un_um2
             )
             spring = 1.0 / (1.0 / probe.sensor_un_um + shear)
-            curves = tuple(each.curve(place, sensor_un_um=spring) for each in solved.cantilevers)
-            self._curves = place, curves
-        return self._curves[1]
+            askew = self._askew(hold, place, ei)
+            held = 0.0 if askew is None else askew.most * askew.softer
+            stiffer = [1.0 / (1.0 - held), 1.0 / (1.0 + held)] if askew else [1.0]
+            curves = tuple(
+                tuple(each.curve(place, sensor_un_um=spring, stiffer=times) for times in stiffer)
+                for each in solved.cantilevers
+            )
+            # Friction takes work: it adds to the push that grows, whichever way that rubs.
+            at_um = COMPARED_PART * self._arm_um(place)
+            curves = tuple(sorted(curves, key=lambda pair: -pair[0].force_un(at_um)))
+            self._curves = _Curves(place, curves, askew)
+        return self._curves
+
+    def _askew(self, hold: Hold, place_um: float, ei_un_um2: float) -> Askew | None:
+        """Return how it gives way up or down for a push there; None: friction does not hold it."""
+        if not self._contact.probe_friction or self.settings.plane_ratio <= 1.0:
+            return None
+        places, weights = compliance_weights(hold, place_um)
+        across, askew, up = (
+            float(weights @ each) for each in self._section.flexibility(places, hold.fate.roll_rad)
+        )
+        cell_um = abs(float(places[1] - places[0]))
+        softer = askew / across
+        most = min(self._contact.probe_friction, MOST_HELD / max(abs(softer), 1e-9))
+        return Askew(softer, askew / up, up * cell_um / ei_un_um2, most)
 
     def _solve(self, hold: Hold, free: Free, probe: "ProbeShape", ei: float) -> "_Solved":
         friction, section, roll = self._contact.probe_friction, self._section, hold.fate.roll_rad
         begin, outwards = hold.at_um, hold.outwards
         near = begin + outwards * np.linspace(0.0, 0.5 * free.length_um, 40)
-        across, askew, up = section.flexibility(near, roll)
-        # Friction holds it up or down, as far as it can, where it would give way askew.
-        held = min(max(float(askew.mean() / up.mean()), -friction), friction)
-        in_plane = ei / float(across.mean())
+        across, _, _ = section.flexibility(near, roll)
+
+        def stiffness(along_um: Floats) -> Floats:
+            across, _, _ = section.flexibility(begin + outwards * along_um, roll)
+            return np.asarray(1.0 / across)
 
         def cantilever(rubbed: float) -> Cantilever:
-            lift = math.copysign(held, held * rubbed) if rubbed else 0.0
-
-            def stiffness(along_um: Floats) -> Floats:
-                across, askew, _ = section.flexibility(begin + outwards * along_um, roll)
-                return np.asarray(1.0 / np.maximum(across - lift * askew, 0.05 * across))
-
             return Cantilever(
                 free.abscissas_um,
                 free.asides_um,
@@ -475,16 +510,15 @@ class Fibre:
             free,
             hold.depth_um,
             ei,
-            in_plane,
+            ei / float(across.mean()),
             section.thickness_um(hold.at_um, roll),
-            held,
             tuple(cantilever(each) for each in ((friction, -friction) if friction else (0.0,))),
         )
 
     @property
     def up_part(self) -> float:
         """Part of the force across that pushes the probe up or down."""
-        return 0.0 if self._solved is None else self._solved.up_part
+        return self._lifting.part
 
 
 @dataclass(frozen=True, slots=True)
@@ -504,8 +538,31 @@ class _Solved:
     ei_un_um2: float
     in_plane_un_um2: float
     thickness_um: float
-    up_part: float
     cantilevers: tuple[Cantilever, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Curves:
+    """All that friction may make of a push at one place.
+
+    Attributes
+    ----------
+    curves : tuple of tuple of PushCurve
+        Of a growing and of a falling push; each with all friction down, then up.
+    """
+
+    place_um: float
+    curves: tuple[tuple[PushCurve, ...], ...]
+    askew: Askew | None
+
+    def push(self, part: float, held: float) -> PushCurve | Push:
+        """Return the push for friction along the fibre, -1 to 1, and a part of the force up."""
+        most = 1.0 if self.askew is None else self.askew.most
+        ways = [
+            each[0] if len(each) == 1 else HeldPush(each[0], each[1], held / most)
+            for each in self.curves
+        ]
+        return ways[0] if len(ways) == 1 else RubbedPush(ways[0], ways[1], part)
 
 
 def _rounded(length_um: float) -> float:

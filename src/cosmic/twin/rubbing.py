@@ -1,13 +1,21 @@
-"""Friction where the probe touches a fibre: it turns round when the probe does."""
+"""Friction where the probe touches a fibre: along it, and up and down the probe."""
 
+from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final, Protocol
+
+from typing_extensions import override
 
 from cosmic.twin.rod import PushCurve
+
+ROUNDS: Final = 6
+LEAST_UN: Final = 1e-9
 
 
 @dataclass(slots=True)
 class Rubbing:
-    """Which way the fibre is rubbed, over the travel of the probe.
+    """Which way the fibre is rubbed along it, over the travel of the probe.
 
     Attributes
     ----------
@@ -30,24 +38,149 @@ class Rubbing:
 
 
 @dataclass(frozen=True, slots=True)
-class RubbedPush:
-    """Force over travel between that of a growing and of a falling push."""
+class Askew:
+    """How a fibre that is pushed gives way up or down, at one place.
 
-    growing: PushCurve
-    falling: PushCurve
+    Attributes
+    ----------
+    softer : float
+        By which part it gives way less across for a force up of 1, as a part of that across.
+    ratio : float
+        Force up, as a part of that across, that keeps it from going up or down at all.
+    up_um_un : float
+        How far it goes down for a force down.
+    most : float
+        Part of the push that friction can have.
+    """
+
+    softer: float
+    ratio: float
+    up_um_un: float
+    most: float
+
+
+@dataclass(slots=True)
+class Lifting:
+    """Friction that keeps a section that stands askew from sliding up or down the probe.
+
+    As long as friction can give the force that this takes, the contact sticks, and the fibre is as
+    stiff as one that cannot go aside. Beyond, it slides, and friction has the part of the push that
+    it can have. When the push falls it sticks again, until friction has turned round.
+
+    Attributes
+    ----------
+    part : float
+        Part of the push that it has, positive where it holds the fibre down.
+    """
+
+    part: float = 0.0
+    _place_um: float = 0.0
+    _height_um: float = 0.0
+
+    def follow(
+        self,
+        force_un: Callable[[float, float], float],
+        travel_um: float,
+        back_um: float,
+        height_um: float,
+        askew: Askew,
+    ) -> float:
+        """Take note of where probe and fibre are now, and return `part`.
+
+        Parameters
+        ----------
+        force_un : callable
+            Force across for a travel and a `part`.
+        back_um : float
+            How far the fibre stands back by what crept: that alone moves no contact.
+        height_um : float
+            How high the fibre would be beside the probe.
+        """
+        crept_um = self._place_um - back_um
+        rose_um = height_um - self._height_um
+        self._place_um, self._height_um = travel_um + back_um, height_um
+        if travel_um <= 0.0:
+            self.part = 0.0
+            return 0.0
+        before = max(force_un(crept_um, self.part), 0.0)
+        held = self.part * before
+        part = self.part
+        for _ in range(ROUNDS):
+            now = force_un(travel_um, part)
+            up = held + askew.ratio * (now - before) + rose_um / askew.up_um_un
+            part = min(max(up / max(now, LEAST_UN), -askew.most), askew.most)
+        self.part = part
+        return part
+
+
+class Push(Protocol):
+    """Force over the travel of a probe."""
+
+    @property
+    @abstractmethod
+    def reach_um(self) -> float:
+        """Travel at which the fibre slides off."""
+
+    @abstractmethod
+    def force_un(self, travel_um: float) -> float:
+        """Return the force at a travel."""
+
+    @abstractmethod
+    def along_un(self, travel_um: float) -> float:
+        """Return the force along the fibre on the probe at a travel, outwards."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeldPush(Push):
+    """A push with friction up or down: what it gives way follows between the two, evenly.
+
+    Attributes
+    ----------
+    part : float
+        1: all that friction may be downwards; -1: upwards.
+    """
+
+    down: PushCurve
+    up: PushCurve
     part: float
 
     @property
+    @override
     def reach_um(self) -> float:
-        """Travel at which the fibre slides off."""
+        return min(self.down.reach_um, self.up.reach_um)
+
+    @override
+    def force_un(self, travel_um: float) -> float:
+        one, other = self.down.force_un(travel_um), self.up.force_un(travel_um)
+        if not one * other > 0.0:
+            return 0.0
+        return 2.0 / ((1.0 + self.part) / one + (1.0 - self.part) / other)
+
+    @override
+    def along_un(self, travel_um: float) -> float:
+        one = self.down.force_un(travel_um)
+        return self.force_un(travel_um) * self.down.along_un(travel_um) / one if one else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class RubbedPush(Push):
+    """A push between a growing and a falling one."""
+
+    growing: Push | PushCurve
+    falling: Push | PushCurve
+    part: float
+
+    @property
+    @override
+    def reach_um(self) -> float:
         return min(self.growing.reach_um, self.falling.reach_um)
 
+    @override
     def force_un(self, travel_um: float) -> float:
-        """Return the force at a travel."""
         one, other = self.growing.force_un(travel_um), self.falling.force_un(travel_um)
         return 0.5 * (one + other) + 0.5 * self.part * (one - other)
 
+    @override
     def along_un(self, travel_um: float) -> float:
-        """Return the force along the fibre on the probe at a travel, outwards."""
         one, other = self.growing.along_un(travel_um), self.falling.along_un(travel_um)
         return 0.5 * (one + other) + 0.5 * self.part * (one - other)

@@ -271,7 +271,15 @@ class Workspace:
             fibre.follow(self._time_s, 0.0, along)
             return None
         self._slack_um = 0.0
-        curve = fibre.push(line, along, travel, self._probe_shape, self._time_s, back_um=back)
+        curve = fibre.push(
+            line,
+            along,
+            travel,
+            self._probe_shape,
+            self._time_s,
+            back_um=back,
+            height_um=line.z_um(along) - probe[2],
+        )
         force = curve.force_un(travel)
         if travel > curve.reach_um:
             touch.lose()

@@ -215,7 +215,13 @@ def test_friction_makes_a_loop() -> None:
         FIBRE.model_copy(update={"curl_deg": 30.0 * FIBRE.length_um / TURNED_UM}),
         probe_friction=0.4,
     )
-    assert abs(lever_fit(curled).loop) > 0.03
+    assert lever_fit(curled).loop > 0.03
+
+
+@pytest.mark.parametrize("curl_deg", [-60.0, -25.0, 0.0, 25.0, 60.0])
+def test_friction_takes_work_whichever_way_a_fibre_is_curled(curl_deg: float) -> None:
+    curled = FIBRE.model_copy(update={"curl_deg": curl_deg * FIBRE.length_um / TURNED_UM})
+    assert lever_fit(settings(curled, probe_friction=0.35)).loop > 0.005
 
 
 def test_friction_holds_a_ribbon_that_stands_askew() -> None:
@@ -223,6 +229,35 @@ def test_friction_holds_a_ribbon_that_stands_askew() -> None:
     free = lever_fit(with_fibre(**askew))
     held = lever_fit(settings(FIBRE.model_copy(update=askew), probe_friction=0.3))
     assert held.loop > free.loop + 0.1
+
+
+def test_a_ribbon_that_friction_holds_altogether_is_too_stiff_both_ways() -> None:
+    steep = FIBRE.model_copy(update={"plane_ratio": 4.0, "orientation_deg": 75.0})
+    free, held = (lever_fit(settings(steep, probe_friction=each)) for each in (0.0, 0.3))
+    cos, sin = math.cos(math.radians(75.0)), math.sin(math.radians(75.0))
+    across, askew, up = cos**2 + sin**2 / 4.0, 0.75 * cos * sin, sin**2 + cos**2 / 4.0
+    assert askew / up < 0.3, "friction can hold it"
+    stiffer = (1.0 + held.ei_off) / (1.0 + free.ei_off)
+    assert stiffer == pytest.approx(1.0 / (1.0 - askew**2 / (across * up)), abs=0.02)
+    assert abs(held.loop) < 0.02, "no loop tells"
+
+
+def test_friction_lets_go_as_much_one_way_as_the_other_once_a_fibre_was_slid() -> None:
+    steep = FIBRE.model_copy(update={"plane_ratio": 4.0, "orientation_deg": 75.0})
+    forces = {}
+    for friction in (0.0, 0.3):
+        bench = Bench(settings(steep, probe_friction=friction))
+        bench.go(left_x=3600.0).go(left_z=-810.0)
+        touch = -5000.0 + 0.5 * bench.moment.fibres[0].seen_um
+        read = [bench.go(200.0, probe_y=touch + 20.0).go(200.0, probe_y=touch - 2.0).force_un]
+        for side in (10.0, -10.0):
+            read.append(bench.go(left_z=-810.0 + side).go(left_z=-810.0).force_un)
+        forces[friction] = read
+    free, (before, up, down) = forces[0.0][0], forces[0.3]
+    assert forces[0.0] == pytest.approx([free] * 3), "without friction nothing changes"
+    assert before > 1.05 * free
+    assert abs(up - down) > 0.1 * free
+    assert 2.0 / (1.0 / up + 1.0 / down) == pytest.approx(free, rel=0.01)
 
 
 def test_friction_does_not_turn_round_while_the_probe_stands_and_the_fibre_creeps() -> None:

@@ -33,6 +33,9 @@ UNLIKELY: Final = 1e-3
 TWISTED: Final = 0.25
 """Of what friction does to a section askew: the part that differs between spans, by twist."""
 
+TWISTED_LEAST: Final = 0.03
+ALONG: Final = ("friction along, once it let go", "")
+
 LEAST_STD: Final = 0.004
 """Of ln(k): a model is no better than this."""
 
@@ -167,16 +170,24 @@ def readings_of(
         to_common[:, FRICTION] = 0.0
     same = span[:, None] == span[None, :]
     own = _own(response, span, settings, direction)
+    freed = None if certified is not None else _freed(fits, rows, settings)
     if certified is not None:
         own = (*own[2:], ("friction", "", friction, 0.0, settings.friction_std))
+    if freed is not None:
+        shift, askew = freed
+        # The friction along the fibre may have let go as well.
+        own = (*own, (*ALONG, np.where(sign > 0.0, friction, 0.0), 0.0, 0.5 * settings.friction))
+    else:
+        shift = -_between_branches(span, np.log(k))
+        askew = np.zeros_like(same, dtype=float) if certified else _askew(sign, same, settings)
     return Readings(
-        log_k=np.log(k) - _between_branches(span, np.log(k)),
+        log_k=np.log(k) + shift,
         noise=_noise(fits, rows, settings),
         span=span,
         to_common=to_common,
         own=own,
         repeat=np.outer(contact, contact) * same * settings.contact_std_um**2,
-        askew=np.zeros_like(same, dtype=float) if certified else _askew(sign, same, settings),
+        askew=askew,
         response=response,
         longest=_longest(response),
         certified=certified,
@@ -210,6 +221,33 @@ def _askew(sign: Floats, same: np.ndarray, settings: FitSettings) -> Floats:
     """Return the covariance of ln(k) by what friction takes of it out, and adds back."""
     each = settings.askew_std**2 * (1.0 + TWISTED**2 * same)
     return np.asarray(each * np.outer(sign, sign))
+
+
+def _freed(
+    fits: Sequence[SpanFit], rows: Sequence["_Row"], settings: FitSettings
+) -> tuple[Floats, Floats] | None:
+    """Return what is to be added to ln(k), and its covariance; None: friction never let go.
+
+    On the way out a section askew was as much too stiff as the force fell once friction let go;
+    where that was not tried, as much as in the other spans, but for twist. Of the way back nothing
+    is known: how far friction has turned round there depends on the section.
+    """
+    logs = np.array([each.freed_log for each in fits])
+    stds = np.array([each.freed_std_part for each in fits])
+    known = np.isfinite(logs) & np.isfinite(stds)
+    if not known.any():
+        return None
+    weights = 1.0 / np.maximum(stds[known], LEAST_STD) ** 2
+    mean = float(weights @ logs[known] / weights.sum())
+    twisted = math.hypot(TWISTED * mean, TWISTED_LEAST)
+    logs = np.where(known, logs, mean)
+    stds = np.where(known, stds, math.hypot(twisted, float(weights.sum() ** -0.5)))
+    span = np.array([each.span for each in rows])
+    out = np.array([each.sign > 0.0 for each in rows])
+    of_out = np.diag(stds[span] ** 2) * np.outer(out, out)
+    same = span[:, None] == span[None, :]
+    back = np.outer(~out, ~out) * settings.askew_std**2 * (1.0 + same)
+    return logs[span] * out, np.asarray(of_out + back)
 
 
 def _between_branches(span: np.ndarray, log_k: Floats) -> Floats:

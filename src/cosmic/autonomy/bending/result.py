@@ -128,6 +128,9 @@ class SpanFit:
         How much farther out contact ends than it began.
     relaxation_part, relaxation_std_part : float
         Part of the force that is lost in a tenfold time.
+    freed_log, freed_std_part : float
+        ln of the force, as a part of itself, once friction was made to let go of a section askew,
+        and its standard deviation; nan where that was not tried.
     """
 
     place_um: float
@@ -155,6 +158,8 @@ class SpanFit:
     shift_std_um: float = math.nan
     relaxation_part: float = math.nan
     relaxation_std_part: float = math.nan
+    freed_log: float = math.nan
+    freed_std_part: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)

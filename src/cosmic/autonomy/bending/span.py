@@ -13,6 +13,32 @@ Floats = npt.NDArray[np.float64]
 
 @renamed_fields(way_um="probe_um")
 @dataclass(frozen=True, slots=True, eq=False)
+class Freed:
+    """The force after the fibre was slid up and down the probe, and back to where it was.
+
+    Friction that holds a section askew, and makes it too stiff, is turned round by that: as much
+    of it is left after a slide up as is left, the other way, after one down.
+
+    Attributes
+    ----------
+    after : int
+        Number of the point of the span that was read just before, at the same place.
+    up_un, down_un : ndarray, shape (n,), float64
+        Mean force after each slide up, and after each down.
+    std_un : float
+        Standard deviation of each.
+    wait_s : float
+        From the point before until half of these were read.
+    """
+
+    after: int
+    up_un: Floats
+    down_un: Floats
+    std_un: float
+    wait_s: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Span:
     """One push of the probe against a held fibre, out and back, at one position along it.
 
@@ -36,6 +62,8 @@ class Span:
     shape : NaturalShape or None
         Of the fibre before the push, where it is not straight; `nominal_um` is then the lever of
         a straight fibre that gives way as much.
+    freed : Freed or None
+        What was read on the way out once friction was made to let go; None: it was not.
     """
 
     nominal_um: float
@@ -47,3 +75,4 @@ class Span:
     time_s: Floats
     loading: npt.NDArray[np.bool_]
     shape: NaturalShape | None = None
+    freed: Freed | None = None

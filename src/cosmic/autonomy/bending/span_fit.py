@@ -23,6 +23,7 @@ from cosmic.autonomy.bending.branch import (
 )
 from cosmic.autonomy.bending.branch import stuck as clings
 from cosmic.autonomy.bending.curved import NaturalShape, PushedCurve
+from cosmic.autonomy.bending.freed import freed_of
 from cosmic.autonomy.bending.response import straight
 from cosmic.autonomy.bending.result import Floats, Quality, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
@@ -44,6 +45,11 @@ TURNING_PART: Final = 0.1
 RELAXED_AT_S: Final = 1.0
 SLIPPED_PART: Final = 0.03
 """Of stroke and highest force: less does no harm."""
+
+STICKS_PART: Final = 0.1
+"""Of the stroke: so much farther out contact seems to end where a section askew sticks at first on
+the way back. Friction that takes a fifth of what it gives way, half of what would hold it, makes
+this."""
 
 SURE_TIMES: Final = 2.0
 EXPLAINED_TIMES: Final = 3.0
@@ -334,6 +340,7 @@ def _span_result(
     baseline = model.baseline(values)
     fitted = np.full(len(span.probe_um), math.nan)
     fitted[points.kept] = model.total(values)
+    freed = freed_of(span, values[-3] + values[-2] * (span.time_s - points.time_s[0]), values[-1])
     out, back = (values[:2], values[2:4]) if both else (values[:2], (math.nan, math.nan))
     stds = np.sqrt(np.diag(covariance))
     shift = covariance[1, 1] + covariance[3, 3] - 2.0 * covariance[1, 3] if both else math.nan
@@ -363,6 +370,8 @@ def _span_result(
         shift_std_um=math.sqrt(shift) if shift > 0.0 else math.nan,
         relaxation_part=float(values[-1]),
         relaxation_std_part=float(stds[-1]),
+        freed_log=freed[0],
+        freed_std_part=freed[1],
     )
 
 
@@ -386,7 +395,9 @@ def _flags(
         flags.add(Quality.HYSTERESIS)
     if fit.k_std_un_um > fit.k_un_um * settings.soft_percent / 100.0:
         flags.add(Quality.TOO_SOFT)
-    away = span.force_un[points.kept] - fit.fitted_un[points.kept]
+    # A section askew sticks to the probe for a part of the way back, which is no line then.
+    out = points.kept & span.loading
+    away = span.force_un[out] - fit.fitted_un[out]
     unlikely = chdtrc(max(fit.freedom, 1), fit.chi2) < POOR_PROBABILITY
     if unlikely and float(np.sqrt(np.mean(away**2))) > POOR_PART * fit.peak_un:
         flags.add(Quality.POOR_FIT)
@@ -426,7 +437,7 @@ def _yielded(
         if at_once_um[1] > SLIPPED_PART * stroke:
             return Quality.SLIPPED
     # What gives way as the probe turns back leaves no trace on the way out.
-    return Quality.SLIPPED if fit.shift_um > max(allowed, SLIPPED_PART * stroke) else None
+    return Quality.SLIPPED if fit.shift_um > max(allowed, STICKS_PART * stroke) else None
 
 
 def _kinds_of_yielding(

@@ -14,7 +14,7 @@ import numpy as np
 
 from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.bending.result import BendingResult, Contribution, Kind, Quality, SpanFit
-from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.bending.span import Freed, Span
 from cosmic.autonomy.campaign.records import (
     FIBRE,
     CampaignError,
@@ -430,6 +430,15 @@ def _put_span(group: h5py.Group, span: Span) -> None:
     if span.shape is not None:
         group["shape_um"] = np.column_stack([span.shape.ahead_um, span.shape.aside_um])
         group["shape_um"].attrs["at_um"] = span.shape.at_um
+    if span.freed is not None:
+        group["freed_up_un"], group["freed_down_un"] = span.freed.up_un, span.freed.down_un
+        group["freed_up_un"].attrs.update(
+            {
+                "after": span.freed.after,
+                "std_un": span.freed.std_un,
+                "wait_s": span.freed.wait_s,
+            }
+        )
 
 
 def read_curves(path: Path) -> tuple[tuple[Span, ...], tuple[Floats, ...], tuple[Series, ...]]:
@@ -466,9 +475,26 @@ def _measured_span(group: h5py.Group) -> Span:
         nominal_um=float(group.attrs["nominal_um"]),
         probe_x_um=float(group.attrs["probe_x_um"]),
         hold_x_um=float(group.attrs["hold_x_um"]),
+        probe_um=columns["probe_um"],
+        force_un=columns["force_un"],
+        force_std_un=columns["force_std_un"],
+        time_s=columns["time_s"],
         loading=np.asarray(group["loading"], dtype=np.bool_),
         shape=_natural_shape(group),
-        **columns,
+        freed=_freed(group),
+    )
+
+
+def _freed(group: h5py.Group) -> Freed | None:
+    if "freed_up_un" not in group:  # not tried, or written before it was
+        return None
+    facts = group["freed_up_un"].attrs
+    return Freed(
+        after=int(facts["after"]),
+        up_un=np.asarray(group["freed_up_un"], dtype=np.float64),
+        down_un=np.asarray(group["freed_down_un"], dtype=np.float64),
+        std_un=float(facts["std_un"]),
+        wait_s=float(facts["wait_s"]),
     )
 
 

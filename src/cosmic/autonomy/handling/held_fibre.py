@@ -37,6 +37,8 @@ class HeldFibre:
         Which gripper holds it, where two are at work; empty otherwise.
     probe_from_s, probe_until_s : float or None
         When it had the probe to itself, where two arms are at work.
+    slid_off : bool
+        It left the probe as it was slid up and down: that is not done again.
     stuck : bool
         It could not be put away.
     standard : bool
@@ -74,6 +76,7 @@ class HeldFibre:
     arm: str = ""
     probe_from_s: float | None = None
     probe_until_s: float | None = None
+    slid_off: bool = False
     stuck: bool = False
     standard: bool = False
 

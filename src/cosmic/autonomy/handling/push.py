@@ -17,7 +17,7 @@ from cosmic.autonomy.bending.fit import (
 )
 from cosmic.autonomy.bending.plan import DRY_EI_N_M2, PlannedSpan, SpanLimits, guess_ei, plan_spans
 from cosmic.autonomy.bending.result import BendingError
-from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.bending.span import Freed, Span
 from cosmic.autonomy.handling.careful_move import CarefulMove
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
@@ -110,6 +110,16 @@ SLOW_UM: Final = 100.0
 """How far before where it goes to the probe becomes slow: it may come from far away."""
 MET_STD_UM: Final = 0.7
 """Of the contact that the rise of a push leads back to."""
+LOST_PART: Final = 0.1
+"""Of the force before: what is less has left the probe."""
+CLEAR_UM: Final = 3.0
+"""So far back a fibre does not cling to the probe."""
+FINE_UM: Final = 1.5
+PRESSES: Final = 8
+TINY_UN: Final = 0.01
+SLIDE_TIMES: Final = 2.0
+"""So many times as far as it is pressed a fibre is slid at least: half of friction times how much
+more a ribbon gives way in its other plane."""
 GROWTH: Final = 1.5
 """How much more than the step before one step may add, when the next is foreseen."""
 
@@ -145,6 +155,7 @@ class OneSpan:
         self._push = work.settings.push
         self._probe = work.probe
         self._points = _Points()
+        self._freed: Freed | None = None
         self._shape = shape_of(work, fibre)
         self._slope = self._shape.slope_at(plan.span_um)
         # The probe pushes along its own direction; way grows as it does.
@@ -162,6 +173,7 @@ class OneSpan:
             yield from self._go_in_front()
             base = yield from self._baseline()
             contact = yield from self._search(base)
+            yield from self._slide(base, contact)
             yield from self._out(base, contact)
             self._place_contact(contact)
             yield from self._dwell()
@@ -225,7 +237,8 @@ class OneSpan:
         _, y = work.tip_now(self._probe)
         if self._to_probe(y) > aside:
             yield self._to_travel(aside)
-        if self._fibre.zero_un is None:
+        first = self._fibre.zero_un is None
+        if first:
             self._fibre.zero_un = yield from self._mean_un(push.average_s)
         yield work.go({self._probe.x_axis: x - self._probe.tip_um[0]})
         if self._fibre.tilts:
@@ -235,6 +248,8 @@ class OneSpan:
         # Only where the fibre was met before is it known well enough to come nearer at once.
         known = bool(self._fibre.contacts)
         yield from self._come_to(surface - push.near_um - SURE_TIMES * std if known else aside)
+        if first and push.rest_s > 0.0:
+            yield push.rest_s  # stages that came from far creep on after their sensors stand
 
     def _come_to(self, probe_um: float) -> Steps:
         """Go there, and back again as long as something is felt that should not be there.
@@ -318,6 +333,62 @@ class OneSpan:
         self._fibre.contacts.pop()
         self._note_contact(self._met_um(free_um), MET_STD_UM)
 
+    def _slide(self, base_un: float, free_um: float) -> Steps:
+        """Slide the fibre up and down the probe under a small force, and leave it again.
+
+        Friction holds a section that stands askew, and makes it too stiff; what the force is once
+        that was made to let go tells by how much. The fibre comes back to where it was each time.
+        """
+        push, fibre = self._push, self._fibre
+        wanted = push.slide_um > 0.0 and not (fibre.standard or fibre.slid_off)
+        if not wanted or len(fibre.spans) % push.slide_every:
+            return
+        # Begun from without contact, as the push is.
+        clear_um = free_um - CLEAR_UM
+        yield from self._to(clear_um, push.search_average_s, loading=True)
+        before = yield from self._press(base_un, free_um)
+        if before is not None:
+            after = len(self._points.probe_um) - 1
+            forces = yield from self._slid()
+            least = base_un + LOST_PART * (before.mean_un - base_un)
+            fibre.slid_off = min(each.mean_un for each in forces) < least
+            if not fibre.slid_off:
+                self._freed = Freed(
+                    after=after,
+                    up_un=np.array([each.mean_un for each in forces[::2]]),
+                    down_un=np.array([each.mean_un for each in forces[1::2]]),
+                    std_un=max(float(np.mean([each.std_un for each in forces])), 1e-3),
+                    wait_s=0.5 * (forces[-1].time_s - before.time_s),
+                )
+        yield from self._to(clear_um, push.search_average_s, loading=True)
+
+    def _slid(self) -> Generator[Yielded, object, list[ForceMean]]:
+        """Go up and back, then down and back, and read the force after each."""
+        work, push, height = self._work, self._push, self._work.height_now()
+        forces: list[ForceMean] = []
+        for side in (push.slide_um, -push.slide_um):
+            yield work.go_up(height + side)
+            yield work.go_up(height)
+            mean = yield work.forces.wanted(push.average_s, settle_s=push.settle_s)
+            assert isinstance(mean, ForceMean)
+            forces.append(mean)
+        return forces
+
+    def _press(
+        self, base_un: float, free_um: float
+    ) -> Generator[Yielded, object, ForceMean | None]:
+        """Push until the force is clear; None: so far that no slide would make it let go."""
+        push, step, before = self._push, min(self._step_um(), FINE_UM), 0.0
+        probe_um = free_um
+        for _ in range(PRESSES):
+            probe_um, mean = yield from self._to(probe_um + step, push.average_s, loading=True)
+            force = mean.mean_un - base_un
+            if force >= push.slide_un:
+                pressed = step * force / max(force - before, TINY_UN)
+                return mean if pressed <= push.slide_um / SLIDE_TIMES else None
+            before = max(force, 0.0)
+        return None
+
     def _out(self, base_un: float, contact_um: float) -> Steps:
         push, points = self._push, self._points
         step = self._plan.stroke_um / push.steps_out
@@ -377,6 +448,7 @@ class OneSpan:
                 time_s=np.array(points.time_s),
                 loading=np.array(points.loading, dtype=np.bool_),
                 shape=shape,
+                freed=self._freed,
             )
         )
 

@@ -183,6 +183,12 @@ class PushSettings(StrictModel):
     dwell_s, dwell_looks : float, int
         How long the probe stays where it pushed farthest, and how often the force is read
         meanwhile: it shows how the fibre relaxes.
+    slide_um, slide_every, slide_un : float, int, float
+        How far a pushed fibre is slid up and down the probe, and back to where it was, so that
+        friction lets go of it (0: it is not); at every how many spans; and from which force above
+        the baseline on.
+    rest_s : float
+        How long stages that came from far rest before the first push of a fibre.
     retreat_um : float
         How far the probe goes back from the fibre between spans.
     tilt_um, tilt_longest_um : float
@@ -217,6 +223,10 @@ class PushSettings(StrictModel):
     steps_back: int = Field(6, ge=3)
     dwell_s: float = Field(0.6, ge=0.0)
     dwell_looks: int = Field(3, ge=0)
+    slide_um: float = Field(10.0, ge=0.0, le=20.0)
+    slide_every: int = Field(2, ge=1)
+    slide_un: float = Field(1.2, gt=0.0)
+    rest_s: float = Field(2.0, ge=0.0, le=60.0)
     retreat_um: float = Field(12.0, gt=0.0)
     tilt_um: float = Field(55.0, ge=0.0)
     tilt_longest_um: float = Field(330.0, gt=0.0)

@@ -8,12 +8,14 @@ import sqlite3
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 
 import numpy as np
 import pytest
 
+from cosmic.autonomy.bending.span import Freed
 from cosmic.autonomy.campaign.recorder import Journal
 from cosmic.autonomy.campaign.records import (
     CalibrationNote,
@@ -34,6 +36,19 @@ WRITER = Path(__file__).with_name("killed_writer.py")
 def store(tmp_path: Path) -> Iterator[CampaignStore]:
     with CampaignStore.create(tmp_path / "campaign", INFO) as opened:
         yield opened
+
+
+def test_what_a_slide_has_shown_is_kept_with_its_span(store: CampaignStore) -> None:
+    record = good(store.begin_fibre(Pose(0.0, 0.0, 0.0), time_s=5.0), began_s=5.0)
+    slid = Freed(7, np.array([3.5, 3.4]), np.array([2.9, 3.0]), 0.05, 0.3)
+    first, *others = record.spans
+    store.finish_fibre(replace(record, spans=(replace(first, freed=slid), *others)))
+    read, *rest = CampaignReader(store.folder).fibre(record.number).spans
+    assert read.freed is not None
+    assert (read.freed.after, read.freed.std_un, read.freed.wait_s) == (7, 0.05, 0.3)
+    np.testing.assert_array_equal(read.freed.up_un, slid.up_un)
+    np.testing.assert_array_equal(read.freed.down_un, slid.down_un)
+    assert all(each.freed is None for each in rest)
 
 
 def test_what_is_written_is_read_back_whole(store: CampaignStore) -> None:

@@ -1,0 +1,51 @@
+"""What is left of a force once the friction that holds a section askew was made to let go.
+
+A ribbon that stands askew moves up or down as it is pushed, and the probe holds it. Held
+altogether it is as stiff on the way out as on the way back, and too stiff on both: no push tells.
+Slid up and down the probe and brought back it has as much friction one way as the other, and in
+compliance the mean of both is that of the free fibre.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from cosmic.autonomy.bending.result import Floats
+from cosmic.autonomy.bending.span import Span
+
+UNKNOWN: Final = (math.nan, math.nan)
+READ_S: Final = 0.1
+"""About so long after its step the force before was read."""
+
+LEAST_PART: Final = 0.1
+"""Of the force: what is less than this afterwards has lost the probe."""
+
+CLEAR_SIGMAS: Final = 5.0
+
+
+def freed_of(span: Span, baseline_un: Floats, relaxation_part: float) -> tuple[float, float]:
+    """Return ln of the force after by that before, and its standard deviation; nan: unknown.
+
+    Parameters
+    ----------
+    baseline_un : ndarray, shape (n,), float64
+        At each point of the span.
+    relaxation_part : float
+        Part of the force that goes in a tenfold time: it fell by that meanwhile as well.
+    """
+    freed = span.freed
+    if freed is None or not 0 <= freed.after < len(span.force_un):
+        return UNKNOWN
+    base = float(baseline_un[freed.after])
+    before = float(span.force_un[freed.after]) - base
+    up, down = float(np.mean(freed.up_un)) - base, float(np.mean(freed.down_un)) - base
+    noise = math.hypot(
+        float(span.force_std_un[freed.after]),
+        freed.std_un / math.sqrt(len(freed.up_un) + len(freed.down_un)),
+    )
+    if not (before > CLEAR_SIGMAS * noise and min(up, down) > LEAST_PART * before):
+        return UNKNOWN
+    fell = relaxation_part * math.log10(1.0 + freed.wait_s / READ_S)
+    after = 2.0 / (1.0 / up + 1.0 / down)
+    return math.log(after / before) + fell, math.hypot(noise / before, 0.5 * fell)

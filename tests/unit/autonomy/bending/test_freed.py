@@ -1,0 +1,72 @@
+"""Friction that holds a section askew is told by sliding the fibre, and by nothing else."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from cosmic.autonomy.bending.fit import fit_bending, half_width_percent
+from cosmic.autonomy.bending.freed import freed_of
+from cosmic.autonomy.bending.span import Freed, Span
+from unit.autonomy.bending.test_fit_bending import pushed, rig
+
+LEVEL_UN = 0.4
+HELD = 1.25
+AFTER = 12
+
+
+def held(span: Span, **freed: float) -> Span:
+    """Return a span of a fibre that friction makes stiffer both ways, slid after one reading."""
+    force = LEVEL_UN + HELD * (span.force_un - LEVEL_UN)
+    before = force[AFTER] - LEVEL_UN
+    up, down = (LEVEL_UN + freed.get(name, 1.0) * before for name in ("up", "down"))
+    slid = Freed(AFTER, np.array([up]), np.array([down]), 0.03, 0.2)
+    return dataclasses.replace(span, force_un=force, freed=slid if freed else None)
+
+
+def test_a_fibre_that_friction_holds_both_ways_is_put_right_by_what_sliding_shows() -> None:
+    plain = fit_bending(pushed(rig()))
+    # Friction takes 0.2 of the compliance; slid, it takes 0.1 one way, and adds it the other.
+    slid = fit_bending([held(each, up=0.8 / 0.9, down=0.8 / 1.1) for each in pushed(rig())])
+    unknown = fit_bending([held(each) for each in pushed(rig())])
+    assert unknown.ei_n_m2 == pytest.approx(HELD * plain.ei_n_m2, rel=0.03)
+    assert slid.trusted, slid.reasons
+    assert slid.ei_n_m2 == pytest.approx(plain.ei_n_m2, rel=0.03)
+    assert slid.ei_low_n_m2 < plain.ei_n_m2 < slid.ei_high_n_m2
+    assert any(line.source == "friction along, once it let go" for line in slid.budget)
+
+
+def test_spans_that_were_not_slid_are_taken_to_be_held_like_the_others_and_less_is_known() -> None:
+    spans = pushed(rig())
+    all_slid = fit_bending([held(each, up=0.8, down=0.8) for each in spans])
+    first, *others = spans
+    one_slid = fit_bending([held(first, up=0.8, down=0.8), *(held(each) for each in others)])
+    assert one_slid.ei_n_m2 == pytest.approx(all_slid.ei_n_m2, rel=0.04)
+    assert half_width_percent(one_slid) > half_width_percent(all_slid)
+
+
+@pytest.mark.parametrize(
+    ("freed", "why"),
+    [
+        (None, "not tried"),
+        (Freed(AFTER, np.array([0.45]), np.array([20.0]), 0.03, 0.2), "it left the probe"),
+        (Freed(99, np.array([20.0]), np.array([20.0]), 0.03, 0.2), "no such point"),
+        (Freed(0, np.array([20.0]), np.array([20.0]), 0.03, 0.2), "nothing pressed before"),
+    ],
+)
+def test_what_a_slide_did_not_show_is_not_known(freed: Freed | None, why: str) -> None:
+    span = dataclasses.replace(pushed(rig())[0], freed=freed)
+    found = freed_of(span, np.full(len(span.probe_um), LEVEL_UN), 0.02)
+    assert all(math.isnan(each) for each in found), why
+
+
+def test_what_relaxed_meanwhile_is_not_taken_for_friction() -> None:
+    span = pushed(rig())[0]
+    before = span.force_un[AFTER] - LEVEL_UN
+    fell = 1.0 - 0.05 * math.log10(1.0 + 0.9 / 0.1)
+    after = np.array([LEVEL_UN + fell * before])
+    slid = dataclasses.replace(span, freed=Freed(AFTER, after, after, 0.001, 0.9))
+    log, std = freed_of(slid, np.full(len(span.probe_um), LEVEL_UN), 0.05)
+    assert log == pytest.approx(0.0, abs=0.003)
+    assert std > 0.02, "how fast it relaxed just then is not well known"
