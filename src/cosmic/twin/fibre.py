@@ -558,11 +558,11 @@ class _Curves:
     def push(self, part: float, held: float) -> PushCurve | Push:
         """Return the push for friction along the fibre, -1 to 1, and a part of the force up."""
         most = 1.0 if self.askew is None else self.askew.most
-        ways = [
+        both = [
             each[0] if len(each) == 1 else HeldPush(each[0], each[1], held / most)
             for each in self.curves
         ]
-        return ways[0] if len(ways) == 1 else RubbedPush(ways[0], ways[1], part)
+        return both[0] if len(both) == 1 else RubbedPush(both[0], both[1], part)
 
 
 def _rounded(length_um: float) -> float:
