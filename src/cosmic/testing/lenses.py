@@ -113,7 +113,7 @@ class LensContract:
         assert state.moving
         assert state.position_counts < limit
 
-    def test_abort_stops_both_on_the_way(self, it: OpenLens) -> None:
+    def test_abort_stops_both_while_they_move(self, it: OpenLens) -> None:
         limits = {axis: it.homed(axis) for axis in LensAxis}
         for axis, limit in limits.items():
             it.lens.seek(axis, limit)

@@ -145,7 +145,7 @@ def test_a_waiting_receiver_wakes_when_a_test_moves_the_time(stand: Stand) -> No
 # --- buffers and triggers -------------------------------------------------------------------------
 
 
-def test_the_size_of_a_frame_is_told_without_a_wait_for_its_pixels() -> None:
+def test_the_size_of_a_frame_is_known_without_a_wait_for_its_pixels() -> None:
     def draw() -> Drawing:
         raise AssertionError("somebody waited for the pixels")
 

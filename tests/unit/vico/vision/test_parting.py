@@ -22,7 +22,7 @@ def test_a_gap_of_half_a_width_parts_two_fibres(width: float, gap: float) -> Non
 
 
 @pytest.mark.parametrize("apart", [15.0, 17.0])
-def test_three_fibres_side_by_side_are_told_apart_and_called_a_bundle(apart: float) -> None:
+def test_three_fibres_side_by_side_are_separated_and_called_a_bundle(apart: float) -> None:
     lines = [
         arc((100.0 + 15.0 * n, 180.0 + apart * n), 0.0, 300.0 + 20.0 * n, 0.0) for n in range(3)
     ]

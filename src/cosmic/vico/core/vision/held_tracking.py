@@ -138,14 +138,14 @@ class HeldFibreTracker:
         corner = np.array([left, top], dtype=np.float64)
         gripper = replace(found, hold_px=(found.hold_px[0] - left, found.hold_px[1] - top))
         self._frames += 1
-        ways: list[Callable[[], list[_Line]]] = [
+        searches: list[Callable[[], list[_Line]]] = [
             lambda: self._retraced(part, corner, found.hold_px),
             lambda: [_line_of(each) for each in find_fibres(part)],
         ]
         reason = ""
-        for way in ways[::-1] if self._frames % ANEW_EVERY == 0 else ways:
+        for search in searches[::-1] if self._frames % ANEW_EVERY == 0 else searches:
             try:
-                held, reason = self._chosen(way(), gripper)
+                held, reason = self._chosen(search(), gripper)
             except CosmicError as exc:
                 reason = str(exc)
                 continue

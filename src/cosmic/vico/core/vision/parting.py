@@ -113,9 +113,9 @@ def separated(
     for index, strand in suspects[:MOST_SUSPECTS]:
         if index in gone:
             continue
-        told = _told_apart(scene, strand, least)
-        fresh += told
-        parts = [part for part, _ in told]
+        separated = _separated(scene, strand, least)
+        fresh += separated
+        parts = [part for part, _ in separated]
         gone |= {n for n, each in enumerate(kept) if parts and _covered(each, parts, ON)}
         gone |= {index} if parts else set()
     old = [each for n, each in enumerate(zip(kept, found, strict=True)) if n not in gone]
@@ -123,7 +123,7 @@ def separated(
     return [strand for strand, _ in both], [course for _, course in both]
 
 
-def _told_apart(scene: Scene, strand: Strand, least: float) -> list[tuple[Strand, Course | None]]:
+def _separated(scene: Scene, strand: Strand, least: float) -> list[tuple[Strand, Course | None]]:
     """Return the fibres of a bundle, none where they cannot be told apart."""
     for depth in DEPTHS:
         parts = _parts(scene, strand, least, depth)
@@ -132,7 +132,7 @@ def _told_apart(scene: Scene, strand: Strand, least: float) -> list[tuple[Strand
         courses = [
             refine(scene, each, neighbours_of(scene, parts, n)) for n, each in enumerate(parts)
         ]
-        if _told(courses, least):
+        if _separate(courses, least):
             return list(zip(parts, courses, strict=True))
     return []
 
@@ -179,7 +179,7 @@ def _mask(scene: Scene, low: np.ndarray, high: np.ndarray, depth: float) -> Mask
     return np.asarray(height > np.maximum(level, depth * strongest), dtype=np.uint8)
 
 
-def _told(courses: Sequence[Course | None], least: float) -> bool:
+def _separate(courses: Sequence[Course | None], least: float) -> bool:
     """Return whether each is long, narrow, even, and has two ends."""
     return all(
         course is not None

@@ -37,12 +37,12 @@ class FibreHeights:
 
     Attributes
     ----------
-    way_px : ndarray, shape (n,)
+    along_px : ndarray, shape (n,)
         Along its centre line, of the middles of the parts measured.
     height_um, std_um : ndarray, shape (n,)
     """
 
-    way_px: Floats
+    along_px: Floats
     height_um: Floats
     std_um: Floats
 
@@ -102,18 +102,18 @@ def heights_along(stack: FocalStack, line_px: Floats, width_px: float) -> FibreH
         Too little of it is in focus within the stack.
     """
     line = resampled(np.asarray(line_px, dtype=np.float64), STEP_PX)
-    way = arc_lengths(line)
+    along = arc_lengths(line)
     # The tips are edges across, which the line's own profiles do not show.
-    inner = (way > END_WIDTHS * width_px) & (way < way[-1] - END_WIDTHS * width_px)
+    inner = (along > END_WIDTHS * width_px) & (along < along[-1] - END_WIDTHS * width_px)
     part = max(PART_PX, PART_WIDTHS * width_px)
-    count = int((way[-1] - 2.0 * END_WIDTHS * width_px) / part)
+    count = int((along[-1] - 2.0 * END_WIDTHS * width_px) / part)
     if count < FEWEST_PARTS:
         raise NotAvailable("heights: the fibre is too short for its height to be measured")
-    number = np.minimum((way[inner] - way[inner][0]) / part, count - 0.5).astype(np.intp)
+    number = np.minimum((along[inner] - along[inner][0]) / part, count - 0.5).astype(np.intp)
     profiles = _Profiles(line[inner], width_px)
     energy = np.stack([profiles.energy(image, number, count) for image in stack.images])
     found = vertices(stack.heights_um, energy)
-    middles = np.bincount(number, way[inner], count) / np.maximum(
+    middles = np.bincount(number, along[inner], count) / np.maximum(
         np.bincount(number, minlength=count), 1
     )
     known = np.isfinite(found.height_um) & (found.std_um < RESOLVED * stack.step_um)
@@ -144,9 +144,9 @@ def in_space(
             "are no view"
         )
     line = resampled(np.asarray(line_px, dtype=np.float64), STEP_PX)
-    way = arc_lengths(line)
-    curve = _Curve.through(heights, float(way[-1]))
-    height = curve.at(way)
+    along = arc_lengths(line)
+    curve = _Curve.through(heights, float(along[-1]))
+    height = curve.at(along)
     axis = view.axis_px or (0.5 * (shape[1] - 1), 0.5 * (shape[0] - 1))
     reference = float(height.mean()) if view.height_um is None else view.height_um
     scale = view.scale_um_px * (1.0 - (height - reference) / view.distance_um)
@@ -154,10 +154,10 @@ def in_space(
     steps = np.linalg.norm(np.diff(flat, axis=0), axis=1)
     rises = np.diff(height)
     # Noise of the slope would lengthen it: the expected square is taken off.
-    middle = 0.5 * (way[1:] + way[:-1])
-    spread = curve.slope_variance(middle) * np.diff(way) ** 2
+    middle = 0.5 * (along[1:] + along[:-1])
+    spread = curve.slope_variance(middle) * np.diff(along) ** 2
     lengths = np.sqrt(np.maximum(steps**2 + rises**2 - spread, 0.25 * steps**2))
-    tilt, tilt_std = _tilt(heights, float(steps.sum()) / float(way[-1]))
+    tilt, tilt_std = _tilt(heights, float(steps.sum()) / float(along[-1]))
     wrong = np.radians(tilt_std)
     part = np.hypot(np.tan(np.radians(tilt)) * wrong, 0.5 * wrong**2)
     return SpatialFibre(
@@ -182,7 +182,7 @@ class _Curve:
     @classmethod
     def through(cls, heights: FibreHeights, length_px: float) -> "_Curve":
         middle, half = 0.5 * length_px, max(0.5 * length_px, 1.0)
-        at = (heights.way_px - middle) / half
+        at = (heights.along_px - middle) / half
         degree = 2 if len(at) >= CURVED_PARTS else 1
         fitted, spread, rest = cls._fitted(at, heights, np.ones(len(at), bool), degree)
         typical = max(1.4826 * float(np.median(np.abs(rest))), 0.3)
@@ -205,13 +205,13 @@ class _Curve:
         rest = (heights.height_um - np.polyval(fitted, at)) / heights.std_um
         return np.asarray(fitted), np.asarray(spread), np.asarray(rest)
 
-    def at(self, way_px: Floats) -> Floats:
-        return np.asarray(np.polyval(self.coefficients, (way_px - self.middle_px) / self.half_px))
+    def at(self, along_px: Floats) -> Floats:
+        return np.asarray(np.polyval(self.coefficients, (along_px - self.middle_px) / self.half_px))
 
-    def slope_variance(self, way_px: Floats) -> Floats:
+    def slope_variance(self, along_px: Floats) -> Floats:
         """Return the variance of the slope, um^2 for each px^2."""
         degree = len(self.coefficients) - 1
-        at = (way_px - self.middle_px) / self.half_px
+        at = (along_px - self.middle_px) / self.half_px
         columns = [power * at ** (power - 1) for power in range(degree, 0, -1)]
         by = np.stack([*columns, 0.0 * at], axis=1) / self.half_px
         return np.asarray(np.einsum("ni,ij,nj->n", by, self.covariance, by))
@@ -220,9 +220,9 @@ class _Curve:
 def _tilt(heights: FibreHeights, scale_um_px: float) -> tuple[float, float]:
     """Return the tilt of the straight line through heights, and its deviation, degrees."""
     weight = 1.0 / heights.std_um
-    way_um = heights.way_px * scale_um_px
-    (slope, _), spread = np.polyfit(way_um, heights.height_um, 1, w=weight, cov="unscaled")
-    rest = (heights.height_um - np.polyval([slope, _], way_um)) * weight
+    along_um = heights.along_px * scale_um_px
+    (slope, _), spread = np.polyfit(along_um, heights.height_um, 1, w=weight, cov="unscaled")
+    rest = (heights.height_um - np.polyval([slope, _], along_um)) * weight
     scatter = max(float((rest**2).sum()) / max(len(rest) - 2, 1), 1.0)
     std = float(np.sqrt(spread[0, 0] * scatter)) / (1.0 + slope**2)
     return float(np.degrees(np.arctan(slope))), float(np.degrees(std))
