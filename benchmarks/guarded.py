@@ -195,7 +195,7 @@ def _group(bench: Any, count: int) -> float:
 
     groups, bare, entered = [], [], SimpleQueue[float]()
     for number in range(count):
-        way = skew.WAY_UM if number % 2 else -skew.WAY_UM
+        way = skew.TRAVEL_UM if number % 2 else -skew.TRAVEL_UM
         bench.library.entered[skew.CALL] = lambda *_: entered.put(time.process_time())
         before_s = time.process_time()
         group = bench.mico.move_by(dict.fromkeys(skew.AXES, way), wait=False)

@@ -167,8 +167,8 @@ class DrawnFrame(Frame):
     ----------
     data : callable
         Draws the pixels, read-only, or begins to; is called once.
-    size_px : (int, int)
-        Width and height of what will be drawn.
+    size_px : (int, int) or None
+        Width and height of what will be drawn; None where asking for them may wait for it.
     """
 
     def __init__(
@@ -181,7 +181,7 @@ class DrawnFrame(Frame):
         status: FrameStatus = FrameStatus.COMPLETE,
         pixel_format: PixelFormat = PixelFormat.MONO8,
         *,
-        size_px: tuple[int, int],
+        size_px: tuple[int, int] | None = None,
     ) -> None:
         values = (frame_id, time_s, exposed_s, device_ns, status, pixel_format)
         names = ("frame_id", "time_s", "exposed_s", "device_ns", "status", "pixel_format")
@@ -191,7 +191,7 @@ class DrawnFrame(Frame):
         object.__setattr__(self, "_drawing", Lock())
         object.__setattr__(self, "_size_px", size_px)
 
-    _size_px: tuple[int, int]
+    _size_px: tuple[int, int] | None
     _source: Callable[[], Drawing | Pixels] | Drawing | Pixels
     _drawing: Lock
 
@@ -204,7 +204,7 @@ class DrawnFrame(Frame):
     @property
     @override
     def size_px(self) -> tuple[int, int]:
-        return self._size_px
+        return self._size_px or super().size_px
 
     @override
     def prepare(self) -> None:

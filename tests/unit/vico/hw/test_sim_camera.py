@@ -153,6 +153,8 @@ def test_the_size_of_a_frame_is_known_without_a_wait_for_its_pixels() -> None:
     image = CameraImage("top", frame, Circumstances())
     assert image.size_px == (40, 30)
     assert not frame.ready
+    corrected = replace(frame, data=np.zeros((20, 10), np.uint8))  # as a background is taken off
+    assert (corrected.size_px, corrected.frame_id, corrected.ready) == ((10, 20), 1, True)
 
 
 def test_frames_that_nobody_receives_are_counted_and_not_drawn(stand: Stand) -> None:
