@@ -90,8 +90,10 @@ def test_the_fibre_was_truly_taken_up_bent_and_put_away(done: Campaign, truth: T
     assert set(names[2:-2]) == {"touched", "left"}
     assert names.count("touched") == names.count("left") >= 2
     assert names[-2:] == ["released", "landed"]
-    bent = [each.facts["peak_un"] for each in events if each.event == "left"]
-    assert all(5.0 < peak_un < 0.8 * 180.0 for peak_un in bent)
+    peaks_un = [each.facts["peak_un"] for each in events if each.event == "left"]
+    assert all(0.0 < peak_un < 0.8 * 180.0 for peak_un in peaks_un)
+    # A fibre is touched lightly as well, to be slid on the probe.
+    assert sum(peak_un > 5.0 for peak_un in peaks_un) >= 2
     assert not events[-2].facts["sticks"]
     lay, lies = truth.fibres[number], events[-1].facts
     assert math.dist((lay.x_um, lay.y_um), (lies["x_um"], lies["y_um"])) > 3000.0

@@ -166,6 +166,9 @@ def test_with_a_limit_armed_an_overrun_stops_the_campaign_first_and_it_does_not_
     def strike(campaign: Campaign, daqco: Daqco) -> None:
         latch = campaign.work.mico.application.manager.latch
         before = boards.driver.starts
+        # When the probe is parked the campaign disarms what is armed; the gripper moves after that.
+        arm = [campaign.work.mico[f"left.{axis}"] for axis in "xyz"]
+        wait_for(lambda: any(axis.details.in_motion for axis in arm), "a parked probe")
         daqco.arm_limit("force", low=-150.0, high=150.0, hysteresis=5.0)
         latch.subscribe(lambda state: running_at_stop.append(boards.driver.starts > before))
         overrun(boards, daqco)

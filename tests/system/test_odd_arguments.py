@@ -83,7 +83,8 @@ def sensible(rig: cosmic.Rig) -> dict[str, object]:
         "setpoint_un": 10.0, "device": "none", "profile": "p", "percent": 50.0, "zoom": 2.0,
         "algorithm": "focus", "on": False, "recipe": "quick", "folder": "out", "seconds": 0.01,
         "trajectory": rig.mico.trajectories.parse(f"{HEAD}left.x to 50 um\n"),
-        "follow.path": rig.mico.plan_path({"left.x": 20.0}), "hand": "left", "gripper": "left",
+        "follow.path": rig.mico.plan_path({"left.x": 20.0}),
+        "begin_detour.path": rig.mico.plan_path({"left.x": 20.0}), "hand": "left", "gripper": "left",
         "kind": "map", "work": None, "timeout_s": 0.01,
     }  # fmt: skip
 
