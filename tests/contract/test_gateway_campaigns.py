@@ -40,7 +40,7 @@ class StandIn:
         self.recipe = SimpleNamespace(name=recipe.stem)
         self.store = SimpleNamespace(folder=folder)
         self.phase, self.operation, self.end_reason, self.shortfall = "ready", "", "", ""
-        self.left_s = 60.0
+        self.left_s, self.request = 60.0, ""
         self.progress = SimpleNamespace(done=3, good=2, failed=1, elapsed_s=20.0)
         self.fibres = ()
         self.ended = threading.Event()
