@@ -113,7 +113,7 @@ class CameraView(QWidget):
         self.ghost = GhostLayer()
         self.row, self.status = ToolRow(), StatusRow(self._camera)
         self.calibrate = self.row.add(CalibrateButton(self._camera))
-        self.correct = self.row.add(CorrectButton(self._camera, lambda: self.view.image, now=now))
+        self.correct = CorrectButton(self._camera, lambda: self.view.image, now=now)
         self.contrast, self.chain = ContrastPanel(), ChainPanel(self._camera)
         self.form = SettingsForm(self._camera, self)
         self.chooser = CameraChooser(vico, name)
@@ -185,7 +185,7 @@ class CameraView(QWidget):
         for title, widgets in (
             ("Contrast", (self.contrast,)),
             ("Camera", (self.chooser, self.form.panel)),
-            ("Machine vision", (self.chain,)),
+            ("Machine vision", (self.chain, self.correct)),
         ):
             group = QGroupBox(title)
             inner = QVBoxLayout(group)

@@ -51,7 +51,7 @@ class CorrectButton(QToolButton):
         self._chosen: CameraImage | None = None
         self._found: Relay[Operation[Corrections]] = Relay(self._on_found)
         self.editor: FibreEditor | None = None
-        self.setText("Correct")
+        self.setText("Correct fibres…")
         named(tipped(self, TIP), "correct")
         styled(self, "tool")
         self.clicked.connect(self._on_clicked)
