@@ -84,7 +84,8 @@ def sensible(rig: cosmic.Rig) -> dict[str, object]:
         "algorithm": "focus", "on": False, "recipe": "quick", "folder": "out", "seconds": 0.01,
         "trajectory": rig.mico.trajectories.parse(f"{HEAD}left.x to 50 um\n"),
         "follow.path": rig.mico.plan_path({"left.x": 20.0}),
-        "begin_detour.path": rig.mico.plan_path({"left.x": 20.0}), "hand": "left", "gripper": "left",
+        "begin_detour.path": rig.mico.plan_path({"left.x": 20.0}), "hand": "left",
+        "gripper": "left",
         "kind": "map", "work": None, "timeout_s": 0.01,
     }  # fmt: skip
 
