@@ -88,6 +88,17 @@ def test_a_change_while_it_looks_makes_it_look_again(qtbot, event):
     relay.end()
 
 
+def test_a_relay_that_another_thread_lets_go_of_ends_no_timer_of_the_gui_thread(qtbot):
+    widget = Shown()
+    qtbot.addWidget(widget)
+    for _ in range(20):
+        held = [Relay(widget.hear, least_ms=5)]
+        held[0]()  # its timer runs
+        in_a_thread(held.clear)
+    qtbot.wait(50)
+    assert len(widget.heard) == 20
+
+
 def test_what_has_a_value_is_heard_each_time_and_in_order(qtbot, event):
     widget = Shown()
     qtbot.addWidget(widget)

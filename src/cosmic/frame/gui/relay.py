@@ -48,7 +48,9 @@ class Relay(QObject, Generic[*Ts]):
         self._later: tuple[*Ts] | None = None
         self._rest: QTimer | None = None
         if least_ms:
-            self._rest = QTimer(self, interval=least_ms, singleShot=True)
+            # The receiver's: the last to let go of a relay may be another thread, which must not
+            # end a timer that runs here.
+            self._rest = QTimer(owner, interval=least_ms, singleShot=True)
             self._rest.timeout.connect(self._on_rested)
         owner.destroyed.connect(_ender(self._ends))
         kind = Qt.ConnectionType
@@ -81,6 +83,8 @@ class Relay(QObject, Generic[*Ts]):
         if not args:
             self._arriving = False  # before it looks, so that no change is missed
         if self._rest is not None:
+            if not isValid(self._rest):
+                return  # with its receiver
             if self._rest.isActive():
                 self._later = args
                 return
