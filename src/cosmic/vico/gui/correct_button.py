@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QToolButton, QWidget
@@ -14,8 +15,11 @@ from cosmic.frame.gui.theme import State, state_look
 from cosmic.frame.operation import Operation
 from cosmic.vico.api.camera import CameraHandle
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.measuring.corrections import Corrections
-from cosmic.vico.gui.fibre_editor import FibreEditor
+
+# The editor loads what finds fibres, and that a part of SciPy: too much for a window to open with.
+if TYPE_CHECKING:
+    from cosmic.vico.core.measuring.corrections import Corrections
+    from cosmic.vico.gui.fibre_editor import FibreEditor
 
 TIP = "Correct the fibres of this image: add, cut, join, delete, drag an end"
 
@@ -70,7 +74,7 @@ class CorrectButton(QToolButton):
             self.setEnabled(True)
             self._refuse(str(exc))
 
-    def _on_found(self, ended: Operation[Corrections]) -> None:
+    def _on_found(self, ended: "Operation[Corrections]") -> None:
         self.setEnabled(True)
         image, self._chosen = self._chosen, None
         try:
@@ -80,6 +84,8 @@ class CorrectButton(QToolButton):
             return
         if image is None:
             return
+        from cosmic.vico.gui.fibre_editor import FibreEditor
+
         path = self._camera.directory / f"fibres-{self._now():%Y%m%d-%H%M%S}.tif"
         editor = FibreEditor(image.data, corrections, lambda: save(image, corrections, path))
         editor.setParent(self.window(), Qt.WindowType.Window)
@@ -98,7 +104,7 @@ class CorrectButton(QToolButton):
         self.message.emit(f"{state_look(State.REFUSED).glyph} {reason}")
 
 
-def save(image: CameraImage, corrections: Corrections, path: Path) -> str:
+def save(image: CameraImage, corrections: "Corrections", path: Path) -> str:
     """Keep an image, once, and its corrections beside it; raises `RecordingError`."""
     from cosmic.vico.core.recording.snap import save_image
 
