@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from cosmic.app.cli import main
-from cosmic.app.commands import calibrate as calibrate_command
 from cosmic.app.commands import campaign as campaign_command
+from cosmic.app.commands import chosen_rig
 from cosmic.app.commands import repair as repair_command
 from cosmic.autonomy.campaign.campaign import CampaignPhase
 from cosmic.autonomy.campaign.records import CampaignInfo
@@ -67,7 +67,7 @@ def platforms(monkeypatch: pytest.MonkeyPatch, qapp: object) -> SimpleNamespace:
         )  # fmt: skip
         yield SimpleNamespace(campaign=lambda *_: campaign, simulated=True)
 
-    monkeypatch.setattr(campaign_command, "connect", connect)
+    monkeypatch.setattr(chosen_rig, "connect", connect)
     monkeypatch.setattr(campaign_command, "write_output", lambda *_: [])
     return made
 
@@ -207,7 +207,7 @@ def test_a_flood_of_warnings_is_folded_by_every_command_without_a_window(
             logger.warning("sample %d is late", number)
         raise RecordingError("and that was all")
 
-    monkeypatch.setattr(calibrate_command, "connect", flood)
+    monkeypatch.setattr(chosen_rig, "connect", flood)
     monkeypatch.setattr(repair_command, "close_left_open", flood)
     assert main([command, *([str(tmp_path / "push.h5")] if command == "repair" else [])]) == 1
     printed = capsys.readouterr().err

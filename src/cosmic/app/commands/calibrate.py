@@ -4,8 +4,7 @@ import argparse
 import sys
 from typing import Final
 
-from cosmic.app.connect import connect
-from cosmic.app.stations.address import endpoints_of
+from cosmic.app.commands.chosen_rig import chosen_rig
 from cosmic.autonomy.calibrating.registry import (
     CalibrationEntry,
     CalibrationRegistry,
@@ -25,19 +24,7 @@ def run(chosen: argparse.Namespace) -> int:
     CosmicError
         The configuration is wrong, or there is no such calibration; nothing has moved.
     """
-    rate = 1.0 if chosen.rate is None else chosen.rate
-    with connect(
-        chosen.config,
-        rate=rate,
-        cold=chosen.cold,
-        sample=chosen.sample,
-        truth=chosen.truth,
-        world=chosen.world,
-        stations=endpoints_of(chosen),
-        certificates=chosen.certificates,
-    ) as rig:
-        if chosen.connect:
-            rig.take_control()
+    with chosen_rig(chosen) as rig:
         run = rig.calibrate(anew=chosen.anew, zooms=chosen.zooms)
         run.subscribe(_print_event)
         try:

@@ -9,9 +9,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final, TextIO
 
-from cosmic.app.connect import connect
+from cosmic.app.commands.chosen_rig import chosen_rig
 from cosmic.app.rig import Rig
-from cosmic.app.stations.address import endpoints_of
 from cosmic.autonomy.bending.fit import assess_campaign, in_time, measure_fibre
 from cosmic.autonomy.bending.standards import ForceScale
 from cosmic.autonomy.calibrating.force_scale import (
@@ -51,18 +50,7 @@ def run(chosen: argparse.Namespace) -> int:
     CosmicError
         There is no such channel, a load is none, or the readings cannot be used.
     """
-    with connect(
-        chosen.config,
-        rate=1.0 if chosen.rate is None else chosen.rate,
-        cold=chosen.cold,
-        sample=chosen.sample,
-        truth=chosen.truth,
-        world=chosen.world,
-        stations=endpoints_of(chosen),
-        certificates=chosen.certificates,
-    ) as rig:
-        if chosen.connect:
-            rig.take_control()
+    with chosen_rig(chosen) as rig:
         if chosen.beam is not None:
             return by_beam(rig, chosen.beam, chosen.expanded_percent, chosen.rounds or BENDS)
         if chosen.weights is None:

@@ -9,9 +9,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Final, TextIO
 
-from cosmic.app.connect import connect
+from cosmic.app.commands.chosen_rig import chosen_rig
 from cosmic.app.panels.campaign.output import gui_application, write_output
-from cosmic.app.stations.address import endpoints_of
 from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.opening import read_recipe, recorded
 from cosmic.autonomy.campaign.plates import confirmed
@@ -53,20 +52,8 @@ def run(chosen: argparse.Namespace) -> int:
     sample = chosen.sample or recipe.file.sample.name or None
     with (
         ExitStack() as at_end,
-        connect(
-            chosen.config,
-            rate=rate,
-            cold=chosen.cold,
-            seed=seed,
-            sample=sample,
-            truth=chosen.truth,
-            world=world,
-            stations=endpoints_of(chosen),
-            certificates=chosen.certificates,
-        ) as rig,
+        chosen_rig(chosen, rate=rate, seed=seed, sample=sample, world=world) as rig,
     ):
-        if chosen.connect:
-            rig.take_control()
         campaign = rig.campaign(recipe, chosen.out)
         at_end.callback(_log_to(chosen.out / LOG))  # after this is known to be its own folder
         if rig.simulated:
