@@ -324,12 +324,13 @@ class Recorder:
 
     def _on_chunk(self, chunk: DataChunk) -> None:
         """Write a chunk, or keep it for a recording that may begin; acquisition thread."""
-        now_s = WALL.now_s()
-        positions: tuple[AxisPosition, ...] = ()
-        if self.position_source is not None and now_s >= self._positions_due_s:
-            self._positions_due_s = now_s + POSITIONS_S
-            positions = tuple(self.position_source())
         with self._handing_over:
+            # Asked for in here: the first chunk of a recording has positions, and may be its last.
+            positions: tuple[AxisPosition, ...] = ()
+            now_s = WALL.now_s()
+            if self.position_source is not None and now_s >= self._positions_due_s:
+                self._positions_due_s = now_s + POSITIONS_S
+                positions = tuple(self.position_source())
             self._before.add(chunk, positions)
             writer = self._writer
             if writer is not None:

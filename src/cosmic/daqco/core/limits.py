@@ -126,7 +126,7 @@ class LimitGuard:
     @property
     def armed(self) -> bool:
         """True when any limit is watched."""
-        return any(limit.armed for limit in self._limits.values())
+        return any(limit.armed for limit in tuple(self._limits.values()))
 
     @property
     def crossings(self) -> tuple[Crossing, ...]:
