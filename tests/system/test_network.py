@@ -42,6 +42,7 @@ class Served:
     """A station in this process."""
 
     def __init__(self) -> None:
+        self.foreign = _sockets()
         self.policy = FailurePolicy()
         self.failures: list[Failure] = []
         self.policy.subscribe(self.failures.append)
@@ -352,6 +353,11 @@ def test_connections_leave_no_thread_no_file_and_no_memory(served: Served, count
     assert grown_kb < 40_000
 
 
+def _sockets() -> set[str]:
+    """Return the inodes of this process's sockets; other tests may have left some."""
+    return {each[8:-1] for each in _open_files() if each.startswith("socket:[")}
+
+
 def _open_files() -> list[str]:
     found = []
     for each in Path("/proc/self/fd").iterdir():
@@ -363,7 +369,7 @@ def _open_files() -> list[str]:
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks into /proc")
 def test_nothing_listens_beyond_this_computer(served: Served) -> None:
     with connected(served.endpoint):
-        own = {each[8:-1] for each in _open_files() if each.startswith("socket:[")}
+        own = _sockets() - served.foreign
         listening_at = set()
         for table, state in (("tcp", "0A"), ("tcp6", "0A"), ("udp", "07"), ("udp6", "07")):
             for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:

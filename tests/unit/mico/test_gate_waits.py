@@ -99,6 +99,31 @@ def test_a_prompt_answer_is_waited_for_in_no_queue(allowed):
         assert len(controller.of("move_to")) == allowed
 
 
+def test_an_order_decided_late_does_not_replace_a_newer_one(monkeypatch):
+    with mico(("LLN",)) as (rig, controller):
+        gate, go = rig.application.manager.gate, Event()
+        gate._checker = Prompt()
+        gate._checker.go.set()
+        decide, prompt, late = gate.decide, gate.decide_promptly, [None]
+
+        def slow(*given):
+            assert go.wait(10.0)
+            return decide(*given)
+
+        monkeypatch.setattr(gate, "decide", slow)
+        monkeypatch.setattr(
+            gate, "decide_promptly", lambda each: late.pop() if late else prompt(each)
+        )
+        older = rig["d0.c0"].move_to(50.0, wait=False)
+        wait_until(lambda: not late)
+        newer = rig["d0.c0"].move_to(20.0, wait=False)
+        wait_until(lambda: bool(controller.of("move_to")))
+        go.set()
+        assert isinstance(older.exception(2), cosmic.MoveCancelled)
+        assert newer.wait(2) == 20.0
+        assert [call[2] for call in controller.of("move_to")] == [20.0]
+
+
 def test_a_stop_waits_for_no_answer_and_nothing_moves_when_it_comes(monkeypatch):
     with waiting(monkeypatch) as (rig, controller, checker, movement):
         began_s = WALL.now_s()

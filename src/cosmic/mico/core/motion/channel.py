@@ -216,14 +216,16 @@ class ChannelController:
     def _still_wanted(self, order: Order, reservation: Reservation) -> bool:
         """See whether `order` may still begin; otherwise it fails."""
         refused = self._outlived(order)
-        if refused is None and not order.movement.cancelled:
+        # The gate may have answered for a newer one at once.
+        overtaken = order.number < self.monitor.begun
+        if refused is None and not overtaken and not order.movement.cancelled:
             return True
         self._context.gate.withdraw(reservation)
         if refused is not None:
             self.turn_away(order, refused)
         else:
-            over = MoveCancelled(f"{self.name}: cancelled before it started")
-            order.movement.fail(over)
+            why = "a newer command came first" if overtaken else "cancelled before it started"
+            order.movement.fail(MoveCancelled(f"{self.name}: {why}"))
         return False
 
     def _go(self, order: Order, reservation: Reservation) -> None:

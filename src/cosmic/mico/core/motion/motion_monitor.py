@@ -269,6 +269,8 @@ class MotionMonitor:
         The movement that was sent, or is about to start with others.
     newest : Movement or None
         The newest that was ordered, also while the gate is asked; None after a halt.
+    begun : int
+        Number of the last order that became the active movement.
     settled : bool
         The channel was seen at rest since it was found.
     """
@@ -284,6 +286,7 @@ class MotionMonitor:
         self._next_poll_s = 0.0
         self.active: ActiveMove | None = None
         self.newest: Movement | None = None
+        self.begun = 0
         self.settled = False
 
     @property
@@ -310,6 +313,7 @@ class MotionMonitor:
         active = ActiveMove(order, reservation, started_s=now_s, progress_s=now_s, jog=jog)
         active.known_pending = isinstance(order.motion, Reference)
         replaced, self.active = self.active, active
+        self.begun = order.number
         if replaced is not None:
             replaced.replaced = True
             replaced.leave_line(self._name)
