@@ -4,6 +4,7 @@ The shipped platform is copied out; one output is named in it, and wired to an i
 is given can be seen.
 """
 
+import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -65,7 +66,10 @@ def main() -> list[str]:
             play_with_the_samples(rig)
             with rig.daqco.record(path):
                 while rig.daqco.outputs[0].playing:
-                    rig.daqco["monitor"].read()
+                    time.sleep(0.01)
+                played_s = rig.daqco.clock.now_s()
+                while rig.daqco.latest_chunk.end_time_s < played_s:
+                    time.sleep(0.01)
             with cosmic.open_recording(path) as recording:
                 seen.append(f"the ramp ends at {recording.values('monitor')[-1]:.1f} V")
 

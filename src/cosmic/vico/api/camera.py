@@ -295,11 +295,30 @@ class CameraHandle(CameraCoordinates, CameraShape, Declared):
         self._unit.recordings.request_stop()
         return self._thread.stop_images()
 
-    @override
     @command(aside=True)
     def software_trigger(self) -> None:
         """Take one image, with the software trigger; raises `NotAvailable` without it."""
         self._thread.trigger()
+
+    @override
+    def triggered_image(self, timeout_s: float = 5.0) -> CameraImage:
+        """Give the software trigger and wait for its image.
+
+        Raises
+        ------
+        NotAvailable
+            It is not the trigger chosen, or no image came in time; the text says why.
+        WrongThreadError
+            Called in the GUI thread.
+        """
+        return self._images.triggered(timeout_s)
+
+    @command(aside=True)
+    def await_triggered(self) -> ImageWait:
+        """Give the software trigger and begin to wait for its image."""
+        wait = ImageWait(self._thread, self.clock.now_s(), self._transform)
+        self._thread.trigger()
+        return wait
 
     # Machine vision
 

@@ -67,6 +67,10 @@ class CameraImages(Protocol):
         """Wait for a whole image exposed from then on."""
 
     @abstractmethod
+    def triggered(self, timeout_s: float) -> CameraImage:
+        """Give the software trigger, and wait for its image."""
+
+    @abstractmethod
     def on_image(self, listener: Callable[[], object]) -> Callable[[], None]:
         """Call `listener()` at each whole image."""
 
@@ -117,6 +121,12 @@ class LocalImages(CameraImages):
     def next(self, timeout_s: float, since_s: float | None) -> CameraImage:
         since = self._application.clock.now_s() if since_s is None else since_s
         return self._unit.thread.next_image(since, timeout_s)
+
+    @override
+    def triggered(self, timeout_s: float) -> CameraImage:
+        since_s = self._application.clock.now_s()
+        self._unit.thread.trigger()
+        return self._unit.thread.next_image(since_s, timeout_s)
 
     @override
     def on_image(self, listener: Callable[[], object]) -> Callable[[], None]:
@@ -191,6 +201,10 @@ class SendingCamera(Protocol):
     @abstractmethod
     def await_image(self, since_s: float | None = None) -> ImageWait:
         """Begin to wait for a whole image."""
+
+    @abstractmethod
+    def await_triggered(self) -> ImageWait:
+        """Give the software trigger and begin to wait for its image."""
 
     @abstractmethod
     def watch_shown(self, receiver: Callable[[SentImage], object]) -> Callable[[], None]:
@@ -284,7 +298,15 @@ class RemoteImages(CameraImages):
     @override
     def next(self, timeout_s: float, since_s: float | None) -> CameraImage:
         forbid_waiting_here("waiting for an image")
-        wait = self._camera.await_image(since_s)
+        return self._received(self._camera.await_image(since_s), timeout_s)
+
+    @override
+    def triggered(self, timeout_s: float) -> CameraImage:
+        forbid_waiting_here("waiting for an image")
+        # Begun by the camera's station: the clocks of two agree to milliseconds only.
+        return self._received(self._camera.await_triggered(), timeout_s)
+
+    def _received(self, wait: ImageWait, timeout_s: float) -> CameraImage:
         try:
             return wait.wait(timeout_s).received()
         except DeviceTimeout:

@@ -75,8 +75,8 @@ class CameraShape:
         """Wait for a whole image exposed from `since_s` of platform time on."""
 
     @abstractmethod
-    def software_trigger(self) -> None:
-        """Take one image, with the software trigger."""
+    def triggered_image(self, timeout_s: float = 5.0) -> CameraImage:
+        """Give the software trigger and wait for its image."""
 
     @abstractmethod
     def now_s(self) -> float:
@@ -172,10 +172,11 @@ class CameraShape:
 
     def _take(self, since_s: float) -> None:
         settings = self.settings
+        timeout_s = WAIT_S + 2.0 * (settings.exposure_s if settings is not None else 0.0)
         if settings is not None and settings.trigger is Trigger.SOFTWARE:
-            self.software_trigger()
-        exposure_s = settings.exposure_s if settings is not None else 0.0
-        image = self.next_image(WAIT_S + 2.0 * exposure_s, since_s)
+            image = self.triggered_image(timeout_s)
+        else:
+            image = self.next_image(timeout_s, since_s)
         when_s = unix_of_platform_s(self._clock, image.frame.exposed_s)
         self._last = self._readings(image, when_s), when_s
 
