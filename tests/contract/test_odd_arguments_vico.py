@@ -35,6 +35,8 @@ def sensible(rig: VicoRig) -> dict[str, object]:
     return {
         "camera": "top", "name": "top", "key": "P1", "tool": "left", "what": "left",
         "point_px": (10.0, 10.0), "point_um": (80.0, 70.0), "timeout_s": 0.01, "since_s": 0.0,
+        # No image comes here: not the 5 s that each waits by itself.
+        "snap.timeout_s": 0.01, "find_fibres.timeout_s": 0.01, "next_image.timeout_s": 0.01,
         "settings": rig.vico.camera("top").settings, "path": Path("made.tif"),
         "format_name": "tiff", "interval_s": 1.0, "count": 1, "directory": Path(),
         "listener": lambda *_: None, "receiver": lambda *_: None, "wanted": lambda: True,
