@@ -34,6 +34,11 @@ LIMIT_S: Final = 20.0
 """How long one image may take; a process that needs longer hangs."""
 MOST_FAULTS: Final = 3
 """After so many the images are drawn here for good."""
+MOST_AHEAD: Final = 8
+"""With so many unanswered, further ones are drawn here, and only if somebody wants them.
+
+Some twenty questions fill the pipe; each end would then wait for the other to read.
+"""
 
 _sets: Final = count(1)
 
@@ -147,6 +152,8 @@ class RemoteDrawer(Drawer):
     def begin(self, view: str, shot: "Shot") -> Drawing:
         """Send the exposure; what lies on the plate only when it has changed."""
         here = self._local.begin(view, shot)
+        if self._process.is_behind():
+            return here
         drawing = _SentDrawing(self._process, here)
         with self._lock:
             try:
@@ -188,6 +195,7 @@ class DrawingProcess:
         self._helper: HelperProcess | None = None
         self._starts = 0
         self._faults = 0
+        self._ahead: set[int] = set()  # images asked for and not come, wanted or not
         self._wanted: WeakValueDictionary[int, _SentDrawing] = WeakValueDictionary()
 
     def start(self) -> int:
@@ -205,6 +213,13 @@ class DrawingProcess:
                 self._helper = HelperProcess(MODULE, stalled_s=round(LIMIT_S), background=True)
                 self._starts += 1
             return self._starts
+
+    def is_behind(self) -> bool:
+        """Tell whether it has as many images to draw as it may have; does not wait."""
+        with self._state:
+            if len(self._ahead) >= MOST_AHEAD and not self._receiving:
+                self._take(0.0)
+            return len(self._ahead) >= MOST_AHEAD
 
     def put(self, kind: str, payload: object, drawing: _SentDrawing | None = None) -> None:
         """Send a question, and remember who waits for its answer.
@@ -225,6 +240,7 @@ class DrawingProcess:
                 if drawing is not None:
                     drawing.number = number
                     self._wanted[number] = drawing
+                    self._ahead.add(number)
             helper.put(number, kind, payload, LIMIT_S)
 
     def has_reply(self, drawing: _SentDrawing) -> bool:
@@ -275,6 +291,7 @@ class DrawingProcess:
         finally:
             self._state.acquire()
             self._receiving = False
+        self._ahead.difference_update(reply.number for reply in replies)
         for reply in replies:
             waiting = self._wanted.pop(reply.number, None)
             if waiting is not None:
@@ -294,6 +311,7 @@ class DrawingProcess:
         """Give the process up, and leave it to a thread that listens to it to clear it away."""
         helper, self._helper = self._helper, None
         self._wanted.clear()
+        self._ahead.clear()
         self._state.notify_all()
         if helper is None:
             return ""

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cosmic.frame.clock import WALL, ManualClock
-from cosmic.twin.optics.drawing import MODULE, Drawing, DrawingProcess, RemoteDrawer
+from cosmic.twin.optics.drawing import LIMIT_S, MODULE, Drawing, DrawingProcess, RemoteDrawer
 from cosmic.twin.optics.optics import Optics
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import shipped_settings
@@ -97,13 +97,16 @@ def test_a_process_that_cannot_stay_up_costs_no_image(
 
 
 def test_images_abandoned_half_way_do_not_block_the_next(
-    process: DrawingProcess, monkeypatch: pytest.MonkeyPatch
+    process: DrawingProcess, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     optics = make_optics(process, monkeypatch)
-    for number in range(30):
+    begun_s = WALL.now_s()
+    for number in range(30):  # most of them while the process comes up
         optics.expose(1.0 + number)
     gc.collect()
     assert optics.render(40.0).shape
+    assert WALL.now_s() - begun_s < 0.5 * LIMIT_S
+    assert not caplog.records, "the process was given up"
 
 
 def test_threads_that_ask_at_once_get_each_its_own_image(
