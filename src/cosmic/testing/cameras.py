@@ -14,11 +14,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import ClassVar
 
+import numpy as np
 import pytest
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, DeviceError, NotConnectedError
-from cosmic.vico.hw.interface import Camera, CameraLibrary, Frame, FrameStatus
+from cosmic.vico.hw.interface import Camera, CameraLibrary, Frame, FrameStatus, PixelFormat
 
 
 class CameraContract:
@@ -82,12 +83,21 @@ class CameraContract:
         assert "no such camera" in str(caught.value)
         assert self.key(library) in str(caught.value)
 
-    def test_a_frame_has_the_shape_of_its_settings(self, camera: Camera) -> None:
-        camera.start()
-        (frame,) = self.frames(camera, 1)
-        assert frame.size_px == (camera.settings.roi.width_px, camera.settings.roi.height_px)
-        assert frame.data.shape[:2] == (camera.settings.roi.height_px, camera.settings.roi.width_px)
-        assert frame.pixel_format is camera.settings.pixel_format
+    def test_a_frame_has_shape_and_type_of_its_settings_in_each_format(
+        self, camera: Camera
+    ) -> None:
+        for pixel_format in camera.ranges.pixel_formats:
+            settings = camera.configure(replace(camera.settings, pixel_format=pixel_format))
+            camera.start()
+            (frame,) = self.frames(camera, 1)
+            camera.stop()
+            assert isinstance(frame.data, np.ndarray)
+            layers = (3,) if pixel_format is PixelFormat.RGB8 else ()
+            assert frame.data.shape == (settings.roi.height_px, settings.roi.width_px, *layers)
+            eight = pixel_format in (PixelFormat.MONO8, PixelFormat.RGB8)
+            assert frame.data.dtype == (np.uint8 if eight else np.uint16)
+            assert frame.pixel_format is settings.pixel_format is pixel_format
+            assert frame.size_px == (settings.roi.width_px, settings.roi.height_px)
 
     def test_frames_are_read_only_and_never_written_to_again(self, camera: Camera) -> None:
         camera.start()

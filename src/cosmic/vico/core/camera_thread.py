@@ -33,6 +33,7 @@ from cosmic.vico.hw.interface import (
     CameraSettings,
     Frame,
     FrameStatus,
+    array_of,
 )
 
 logger = logging.getLogger(__name__)
@@ -48,10 +49,23 @@ Receiver = Callable[[CameraImage], object]
 Command = Callable[[Camera], None]
 
 
-def _is_image(data: object) -> bool:
-    """Whether these are pixels: 8 or 16 bits without sign, in two or three dimensions."""
+def _mismatch(frame: Frame, settings: CameraSettings) -> str:
+    """Return how a frame differs from what a camera says of itself; "" where it does not."""
+    if not frame.ready:  # a simulated camera's, which looking at would draw
+        return ""
+    shape, kind = array_of(settings)
+    data = frame.data
+    came = (
+        f"shape {data.shape}, {data.dtype}"
+        if isinstance(data, np.ndarray)
+        else f"no array but {type(data).__name__}"
+    )
+    expected = f"shape {shape}, {np.dtype(kind)}"
+    if came == expected and frame.pixel_format == settings.pixel_format:
+        return ""
     return (
-        isinstance(data, np.ndarray) and data.dtype in (np.uint8, np.uint16) and data.ndim in (2, 3)
+        f"an image of {came}, {frame.pixel_format} came; its settings say {expected}, "
+        f"{settings.pixel_format}"
     )
 
 
@@ -103,6 +117,7 @@ class CameraThread(WorkerThread):
         self._kept: tuple[str, CameraSettings] | None = None
         self._ranges: CameraRanges | None = None
         self._last_id: int | None = None
+        self._refused_s: float | None = None
         self._reopen = False
         self._newest: CameraImage | None = None
         self._shown: CameraImage | None = None
@@ -316,15 +331,38 @@ class CameraThread(WorkerThread):
             self._kept = camera.info.key, self._settings
 
     def _receive(self, camera: Camera) -> Frame | None:
-        """Return the next frame; raises `DeviceError`, also where it is none."""
+        """Return the next frame that is as its settings say; raises `DeviceError`."""
         with only_cosmic_errors(self.camera_name):
             frame = camera.receive(LOOK_S)
-            if frame is not None and frame.ready and not _is_image(frame.data):
-                raise TypeError("what came is no image of whole numbers, height by width")
-            return frame
+            if frame is None:
+                return None
+            mismatch = _mismatch(frame, camera.settings)
+        if mismatch:
+            self._refuse(camera.info, mismatch)
+            return None
+        if self._refused_s is not None and WALL.now_s() - self._refused_s >= SEARCH_S:
+            self._set_problem("")
+            self._refused_s = None
+        return frame
+
+    def _refuse(self, info: CameraInfo, mismatch: str) -> None:
+        """Say why an image is not handed on; the next ones may be right."""
+        text = (
+            f"{self.camera_name} ({info.vendor} {info.model}, {info.serial}): {mismatch}. It is "
+            f"refused. Correct the driver, or what it reads back as its settings"
+        )
+        self._refused_s = WALL.now_s()
+        if text != self._problem:
+            logger.error("%s", text)
+            self._set_problem(text)
+
+    def _set_problem(self, text: str) -> None:
+        self._problem = text
+        self.status_changed.emit()
 
     def _begin(self, camera: Camera) -> None:
-        self._last_id = None
+        self._last_id = self._refused_s = None
+        self._problem = ""
         with only_cosmic_errors(self.camera_name):
             camera.start()
         self._running = True

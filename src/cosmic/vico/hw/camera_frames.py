@@ -7,7 +7,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from cosmic.vico.hw.interface import CameraSettings, PixelFormat, Pixels
+from cosmic.vico.hw.interface import CameraSettings, Pixels, array_of
 
 _SECONDS_OF_BUFFERS: Final = 0.5
 _BUFFERS: Final = (8, 64)
@@ -121,11 +121,8 @@ def buffers_for(rate_hz: float, payload_bytes: int) -> int:
 
 def empty_pixels(settings: CameraSettings) -> Pixels:
     """Return black pixels of the size and format of `settings`, still writeable."""
-    roi, pixel_format = settings.roi, settings.pixel_format
-    colour = pixel_format is PixelFormat.RGB8
-    eight = colour or pixel_format is PixelFormat.MONO8
-    shape = (roi.height_px, roi.width_px, 3) if colour else (roi.height_px, roi.width_px)
-    return np.zeros(shape, np.uint8) if eight else np.zeros(shape, np.uint16)
+    shape, kind = array_of(settings)
+    return np.zeros(shape, np.uint8) if kind is np.uint8 else np.zeros(shape, np.uint16)
 
 
 def copy_rows(start: int, stride_bytes: int, to: Pixels) -> None:

@@ -170,6 +170,14 @@ class CameraSettings:
         )
 
 
+def array_of(settings: CameraSettings) -> tuple[tuple[int, ...], type[np.uint8] | type[np.uint16]]:
+    """Return shape and type that the pixels of a frame have with `settings`."""
+    roi, pixel_format = settings.roi, settings.pixel_format
+    layers = (3,) if pixel_format is PixelFormat.RGB8 else ()
+    eight = pixel_format in (PixelFormat.MONO8, PixelFormat.RGB8)
+    return (roi.height_px, roi.width_px, *layers), np.uint8 if eight else np.uint16
+
+
 @dataclass(frozen=True, slots=True)
 class CameraRanges:
     """What a camera accepts with its present ROI and binning; None where it has no such feature."""
@@ -309,7 +317,8 @@ class Camera(Protocol):
     def receive(self, timeout_s: float) -> Frame | None:
         """Return the next frame in order, or None after `timeout_s` of wall time.
 
-        A frame with parts missing is counted and comes with `FrameStatus.INCOMPLETE`.
+        A frame with parts missing is counted and comes with `FrameStatus.INCOMPLETE`. Every frame
+        has the shape, the type and the pixel format of `settings`, or it is refused.
 
         Raises
         ------

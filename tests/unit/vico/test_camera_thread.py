@@ -1,0 +1,172 @@
+"""What a camera's thread makes of frames that are not what the camera says of itself."""
+
+import itertools
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from typing_extensions import override
+
+from contract.station_rig import wait_until
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import NotAvailable
+from cosmic.frame.failure import FailurePolicy
+from cosmic.testing.cameras import CameraContract
+from cosmic.vico.core.camera_thread import CameraThread
+from cosmic.vico.core.image import CameraImage, Circumstances
+from cosmic.vico.hw.base_camera import BaseCamera
+from cosmic.vico.hw.interface import (
+    CameraInfo,
+    CameraRanges,
+    CameraSettings,
+    Frame,
+    PixelFormat,
+    Range,
+    Roi,
+)
+
+WIDTH, HEIGHT = 64, 48
+FORMATS = (PixelFormat.MONO8, PixelFormat.MONO12, PixelFormat.RGB8)
+GREY = np.zeros((HEIGHT, WIDTH), np.uint8)
+
+
+class OddCamera(BaseCamera):
+    """Gives `data` as its images, whatever its settings say."""
+
+    def __init__(self) -> None:
+        info = CameraInfo("odd", "ACME", "Odd", "SN-7", sensor_px=(WIDTH, HEIGHT))
+        super().__init__(info, WALL, closed=None)
+        self.data: Any = GREY
+        self.pixel_format = PixelFormat.MONO8
+        self._numbers = itertools.count()
+        self._in_force = CameraSettings(0.001, 0.0, 100.0, Roi(0, 0, WIDTH, HEIGHT))
+        self._opened((WIDTH, HEIGHT))
+
+    @override
+    def _read(self) -> CameraSettings:
+        return self._in_force
+
+    @override
+    def _read_ranges(self) -> CameraRanges:
+        sizes = (Range(WIDTH, WIDTH), Range(HEIGHT, HEIGHT))
+        return CameraRanges(None, None, None, *sizes, pixel_formats=FORMATS)
+
+    @override
+    def _write(self, asked: CameraSettings, present: CameraSettings | None) -> None:
+        self._in_force = asked
+
+    @override
+    def _begin(self) -> None:
+        self._numbers = itertools.count()
+
+    @override
+    def _fetch(self, wait_s: float) -> Frame | None:
+        if self._stopping.wait(0.01):
+            return None
+        now_s = WALL.now_s()
+        return Frame(self.data, next(self._numbers), now_s, now_s, pixel_format=self.pixel_format)
+
+    @override
+    def _end(self) -> None: ...
+
+    @override
+    def _release(self) -> None: ...
+
+
+@dataclass
+class Bench:
+    camera: OddCamera
+    thread: CameraThread
+    images: list[CameraImage]
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    camera, images = OddCamera(), list[CameraImage]()
+    thread = CameraThread(
+        "Microscope",
+        lambda: camera,
+        lambda opened: opened.settings,
+        lambda _frame, _settings: Circumstances(),
+        FailurePolicy(),
+    )
+    thread.subscribe(images.append)
+    thread.start()
+    assert wait_until(lambda: images)
+    yield Bench(camera, thread, images)
+    thread.request_end()
+    assert thread.join()
+
+
+WRONG = {
+    "shape (48, 32), uint8, Mono8": np.zeros((HEIGHT, WIDTH // 2), np.uint8),
+    "shape (64, 48), uint8, Mono8": np.zeros((WIDTH, HEIGHT), np.uint8),
+    "shape (48, 64, 3), uint8, Mono8": np.zeros((HEIGHT, WIDTH, 3), np.uint8),
+    "shape (48, 64), uint16, Mono8": np.zeros((HEIGHT, WIDTH), np.uint16),
+    "shape (48, 64), float64, Mono8": np.zeros((HEIGHT, WIDTH)),
+    "shape (0,), float64, Mono8": np.zeros(0),
+    "no array but str, Mono8": "abc",
+}
+
+
+@pytest.mark.parametrize("came", WRONG)
+def test_an_image_other_than_the_settings_say_is_refused_and_the_next_ones_come(
+    came: str, bench: Bench, caplog: pytest.LogCaptureFixture
+) -> None:
+    seen = len(bench.images)
+    bench.camera.data = WRONG[came]
+    assert wait_until(lambda: bench.thread.problem)
+    said = bench.thread.problem
+    assert said.startswith("Microscope (ACME Odd, SN-7): ")
+    assert f"an image of {came} came" in said
+    assert "its settings say shape (48, 64), uint8, Mono8" in said
+    with pytest.raises(NotAvailable, match="its settings say"):
+        bench.thread.next_image(WALL.now_s(), 0.1)
+    assert bench.thread.running
+    bench.camera.data = GREY
+    assert wait_until(lambda: not bench.thread.problem)
+    assert all(each.data is GREY for each in bench.images)
+    assert len(bench.images) > seen
+    assert max(each.lost_before for each in bench.images) > 0, "they are told as lost"
+    told = [each for each in caplog.records if each.levelno >= logging.ERROR]
+    assert len(told) == 1
+
+
+def test_an_image_of_another_format_is_refused(bench: Bench) -> None:
+    bench.camera.pixel_format = PixelFormat.MONO12
+    assert wait_until(lambda: "uint8, Mono12 came" in bench.thread.problem)
+
+
+def test_a_camera_that_is_started_anew_has_no_problem(bench: Bench) -> None:
+    bench.camera.data = "abc"
+    assert wait_until(lambda: bench.thread.problem)
+    bench.thread.stop_images().wait(5.0)
+    bench.camera.data = GREY
+    bench.thread.start_images().wait(5.0)
+    assert not bench.thread.problem
+
+
+@pytest.mark.parametrize("came", WRONG)
+def test_the_suite_for_cameras_catches_it(came: str) -> None:
+    camera = OddCamera()
+    camera.data = WRONG[came]
+    with pytest.raises(AssertionError):
+        Suite().test_a_frame_has_shape_and_type_of_its_settings_in_each_format(camera)
+
+
+def test_the_suite_for_cameras_catches_one_format_for_all() -> None:
+    with pytest.raises(AssertionError):
+        Suite().test_a_frame_has_shape_and_type_of_its_settings_in_each_format(OddCamera())
+
+
+class Suite(CameraContract):
+    """The suite, called by hand."""
+
+    __test__ = False
+
+    @override
+    def make_library(self) -> Any:
+        raise NotImplementedError
