@@ -3,6 +3,7 @@
 import re
 import sys
 import textwrap
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -11,7 +12,10 @@ import pytest
 import cosmic
 from contract.station_rig import wait_until
 from cosmic.app.cli import main
+from cosmic.daqco.api.application import HANG_S
+from cosmic.frame.clock import WALL
 from cosmic.frame.plugins import find_backend
+from cosmic.frame.time_scale import LONGEST_HOLD_S
 
 POINTS = """
 [cosmic.applications]
@@ -304,7 +308,8 @@ from cosmic.daqco.hw.interface import BoardBackend
 from cosmic.daqco.hw.sim_library import SimulatedLibrary
 from cosmic.frame.config import StrictModel
 from cosmic.frame.errors import NotConnectedError
-from cosmic.vico.hw.interface import CameraBackend
+from cosmic.vico.hw.factory import make_camera_library
+from cosmic.vico.hw.interface import CameraBackend, Frame
 
 BROKEN = []
 
@@ -337,21 +342,73 @@ def boards(_options, context):
     return Library(SimulatedLibrary(context.clock, context.scene_sources))
 
 
+def cameras(_options, context):
+    real = make_camera_library("simulated", clock=context.clock, scene=context.scene)
+    return PictureLibrary(real)
+
+
+class PictureLibrary(Library):
+    def open(self, name):
+        return Pictures(self._real.open(name))
+
+
+class Pictures(Brought):
+    def receive(self, timeout_s):
+        frame = self._real.receive(timeout_s)
+        if frame is None:
+            return None
+        data = frame.data if not BROKEN else BROKEN[0](frame.data)
+        return Frame(data, frame.frame_id, frame.time_s, frame.exposed_s)
+
+
 BOARDS = BoardBackend(boards)
+SIMULATED_BOARDS = BoardBackend(boards, simulated=True)
+CAMERAS = CameraBackend(cameras, simulated=True)
 """
 
 
-def test_a_board_that_raises_or_gives_garbage_is_named_and_the_axes_go_on(
-    laboratory: Edit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def troublesome(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Install a package whose board and camera do what a test says; returns its module."""
     module = f"trouble_of_{tmp_path.name.replace('-', '_')}"
     described = tmp_path / "trouble" / "troubleware-0.4.dist-info"
     described.mkdir(parents=True)
     (described.parent / f"{module}.py").write_text(TROUBLE, encoding="utf-8")
     (described / "METADATA").write_text("Name: troubleware\nVersion: 0.4\n", encoding="utf-8")
-    points = f"[cosmic.boards]\ntrouble = {module}:BOARDS\n"
+    points = (
+        f"[cosmic.boards]\ntrouble = {module}:BOARDS\nslow = {module}:SIMULATED_BOARDS\n"
+        f"[cosmic.cameras]\ntrouble = {module}:CAMERAS\n"
+    )
     (described / "entry_points.txt").write_text(points, encoding="utf-8")
     monkeypatch.syspath_prepend(str(described.parent))
+    return module
+
+
+def test_a_camera_whose_images_are_not_as_it_says_is_named_and_goes_on(
+    laboratory: Edit, troublesome: str
+) -> None:
+    folder = laboratory(
+        ('title = "Microscope"\nbackend = "simulated"', 'title = "Microscope"\nbackend = "trouble"')
+    )
+    with cosmic.connect(folder, applications=("mico", "vico")) as rig:
+        camera = rig.vico.camera()
+        whole = camera.next_image(20.0).data
+        broken = sys.modules[troublesome].BROKEN
+        for wrong in (lambda data: data[:-8], lambda data: data.astype(float)):
+            broken.append(wrong)
+            assert wait_until(lambda: camera.problem)
+            came = wrong(whole)
+            assert f"an image of shape {came.shape}, {came.dtype}, Mono8 came" in camera.problem
+            assert f"its settings say shape {whole.shape}, uint8, Mono8" in camera.problem
+            assert camera.name in camera.problem
+            broken.clear()
+            assert wait_until(lambda: not camera.problem)
+            assert camera.next_image(20.0).data.shape == whole.shape
+
+
+def test_a_board_that_raises_or_gives_garbage_is_named_and_the_axes_go_on(
+    laboratory: Edit, troublesome: str
+) -> None:
     folder = laboratory(
         ('[daqco]\nbackend = "simulated"', '[daqco]\nbackend = "trouble"'),
         (APPLICATIONS, 'applications = ["mico", "daqco"]'),
@@ -368,7 +425,7 @@ def test_a_board_that_raises_or_gives_garbage_is_named_and_the_axes_go_on(
             except cosmic.NotAvailable:
                 return False
 
-        broken = sys.modules[module].BROKEN
+        broken = sys.modules[troublesome].BROKEN
         rig.daqco.disarm_limit("force")
         for what, said in (
             (boom, r"Dev\d: RuntimeError: boom"),
@@ -384,3 +441,39 @@ def test_a_board_that_raises_or_gives_garbage_is_named_and_the_axes_go_on(
             broken.clear()
         rig.daqco.start()
         assert wait_until(acquiring)
+
+
+def test_a_board_that_hangs_is_named_and_holds_nobody_for_long(
+    laboratory: Edit, troublesome: str
+) -> None:
+    folder = laboratory(
+        ('[daqco]\nbackend = "simulated"', '[daqco]\nbackend = "slow"'),
+        (APPLICATIONS, 'applications = ["mico", "daqco"]'),
+    )
+    with cosmic.connect(folder, rate=10.0) as rig:
+        assert rig.simulated
+        rig.daqco.disarm_limit("force")
+        broken = sys.modules[troublesome].BROKEN
+        released = threading.Event()
+        broken.append(lambda: released.wait(60.0) and None)
+        try:
+            moved = rig.mico["left.x"].move_by(400.0, wait=False)
+            began_s = WALL.now_s()
+            assert moved.wait(LONGEST_HOLD_S + 6.0) is not None
+            assert wait_until(lambda: not rig.daqco.running)
+            assert WALL.now_s() - began_s < HANG_S + 6.0
+            assert re.search(r"Dev\d: receive has not returned for 5 s", rig.daqco.problem)
+            with pytest.raises(cosmic.DeviceError, match=r"Dev\d: receive still has not returned"):
+                rig.daqco.start()
+        finally:
+            broken.clear()
+            released.set()
+
+        def acquires() -> bool:
+            try:
+                return "force" in rig.daqco.latest()
+            except cosmic.NotAvailable:
+                return False
+
+        rig.daqco.start()
+        assert wait_until(acquires)

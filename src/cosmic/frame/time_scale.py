@@ -22,10 +22,8 @@ LOOK_S: Final = 0.02
 """How often somebody looks again who waits while others work, and may miss their end; wall time."""
 LATE_S: Final = 0.0005
 """How much too late somebody may wake who is not woken for it, wall time."""
-
-
-LONGEST_HOLD_S: Final = 5.0
-"""The time waits so long for somebody and then goes on without, wall time."""
+LONGEST_HOLD_S: Final = 3.0
+"""The time waits so long and then goes on without all who were silent meanwhile, wall time."""
 REACHED_EVERY_S: Final = 0.25
 REACHED_MARKS: Final = 8
 """The rate reached is that of the last two seconds."""
@@ -72,8 +70,9 @@ class TimeScale:
     """A time that runs `rate` times as fast as the wall, and never slower than the smaller of both.
 
     It does not run beyond the nearest horizon, and does not make up for it later. After
-    `LONGEST_HOLD_S` at a horizon that does not move it goes on without the one whose it is, until
-    that one moves it again: somebody who hangs must not stop everybody for ever.
+    `LONGEST_HOLD_S` at a horizon that does not move it goes on without the one whose it is, and
+    without all who said nothing meanwhile, until they do again: who hangs must not stop everybody
+    for ever, nor for as many times as long as there are others that wait for it.
 
     It is bound to the wall only while there is a worker that leads: one who waits for the time,
     and whose next step depends on when it comes. Then it runs like the wall while a worker is
@@ -98,6 +97,7 @@ class TimeScale:
         self._waits: dict[object, _Wait] = {}
         self._slow = min(rate, 1.0)
         self._horizons: dict[object, float] = {}
+        self._heard_wall_s: dict[object, float] = {}
         self._limit_s = math.inf
         self._held_wall_s: float | None = None
         self._marks = deque([(self._wall_s, 0.0)], maxlen=REACHED_MARKS)
@@ -117,9 +117,9 @@ class TimeScale:
             now_s = self._settle()
             before_s, held = self._limit_s, self._held_wall_s is not None
             if until_s is None or until_s == math.inf:
-                self._horizons.pop(token, None)
+                self._forget(token)
             else:
-                self._horizons[token] = until_s
+                self._horizons[token], self._heard_wall_s[token] = until_s, self._wall_s
             self._limit_s = min(self._horizons.values(), default=math.inf)
             if self._limit_s <= before_s:
                 return
@@ -203,10 +203,15 @@ class TimeScale:
             self._now_s = max(self._now_s, self._limit_s)
             return
         for token, until_s in list(self._horizons.items()):
-            if until_s <= max(self._limit_s, self._now_s):
-                del self._horizons[token]
+            silent = self._heard_wall_s[token] <= self._held_wall_s
+            if silent or until_s <= max(self._limit_s, self._now_s):
+                self._forget(token)
         self._limit_s = min(self._horizons.values(), default=math.inf)
         self._held_wall_s = None
+
+    def _forget(self, token: object) -> None:
+        self._horizons.pop(token, None)
+        self._heard_wall_s.pop(token, None)
 
 
 def _wake(waits: Iterable[_Wait]) -> None:
@@ -218,7 +223,10 @@ def _wake(waits: Iterable[_Wait]) -> None:
 
 
 class ScaledHorizon(Horizon):
-    """A horizon of a `Pace`; it is none before it is moved for the first time."""
+    """A horizon of a `TimeScale`; it is none before it is moved for the first time.
+
+    Whoever keeps up moves it again and again, also to where it is.
+    """
 
     def __init__(self, time_scale: TimeScale) -> None:
         self._time_scale = time_scale
@@ -233,12 +241,12 @@ class ScaledHorizon(Horizon):
 
 
 class ScaledWorker(Worker):
-    """A worker that a `Pace` waits for.
+    """A worker that a `TimeScale` waits for.
 
     Parameters
     ----------
     leads : bool
-        It is why the time is bound to the wall; see `Pace`.
+        It is why the time is bound to the wall; see `TimeScale`.
     """
 
     def __init__(self, time_scale: TimeScale, *, leads: bool) -> None:

@@ -29,7 +29,14 @@ from cosmic.daqco.hw.pulses import PulseTrain
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.background import BackgroundJobs, OnResult, do_and_report
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import ConfigError, CosmicError, DeviceError, NotAvailable
+from cosmic.frame.errors import (
+    ConfigError,
+    CosmicError,
+    DeviceError,
+    DeviceFault,
+    DeviceTimeout,
+    NotAvailable,
+)
 from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Task
@@ -74,17 +81,46 @@ class RestartBudget:
         return True
 
 
-class SilenceWatch(WorkerThread):
-    """Looks again and again whether an armed channel has fallen silent."""
+WATCH_S: Final = 0.02
+HANG_S: Final = 5.0
+"""A board that has not answered for so long hangs."""
+BRIEFLY_S: Final = 0.1
 
-    def __init__(self, guard: LimitGuard, policy: FailurePolicy) -> None:
+
+class SilenceWatch(WorkerThread):
+    """Looks again and again whether an armed channel has fallen silent, or a board hangs.
+
+    Parameters
+    ----------
+    asked : callable
+        Tells which board has not answered, and a number of what it was asked.
+    hangs : callable
+        Called with the name of a board that has not answered for `HANG_S`.
+    """
+
+    def __init__(
+        self,
+        guard: LimitGuard,
+        asked: Callable[[], tuple[str, int] | None],
+        hangs: Callable[[str], object],
+        policy: FailurePolicy,
+    ) -> None:
         super().__init__("limit watch", policy)
         self._guard = guard
+        self._asked = asked
+        self._hangs = hangs
 
     @override
     def run_body(self) -> None:
-        while not self._end_requested.wait(0.02):
+        before, looks = self._asked(), 0
+        while not self._end_requested.wait(WATCH_S):
             self._guard.look_for_silence()
+            # Looks are counted: a computer that stood still is not taken for a board that hangs.
+            asked = self._asked()
+            looks = looks + 1 if asked == before and asked is not None else 0
+            before = asked
+            if asked is not None and looks == round(HANG_S / WATCH_S):
+                self._hangs(asked[0])
 
 
 class DaqcoApplication(TaskApplication):
@@ -126,7 +162,8 @@ class DaqcoApplication(TaskApplication):
         self._infos: dict[str, BoardInfo] = {}
         self._core: UDaqCore | None = None
         self._problem = ""
-        self._silence = SilenceWatch(self.guard, policy)
+        self._hung: UDaqCore | None = None
+        self._silence = SilenceWatch(self.guard, self._asked, self._on_hang, policy)
         self._background = BackgroundJobs("DAQCo background", policy)
         self._before_change: tuple[Callable[[DaqcoSettings], None], ...] = ()
         self._failed: Event[str] = Event()
@@ -169,7 +206,7 @@ class DaqcoApplication(TaskApplication):
     def running(self) -> bool:
         """Samples are being acquired."""
         core = self._core
-        return core is not None and core.isRunning()
+        return core is not None and core.isRunning() and not core.given_up
 
     @property
     def rate_hz(self) -> float:
@@ -289,6 +326,8 @@ class DaqcoApplication(TaskApplication):
             A board does not do what the settings ask.
         NotConnectedError, DeviceError
             A board is not there, or taken.
+        DeviceTimeout
+            A board still hangs.
         """
         with self._lock:
             if self.running and not self._problem:
@@ -297,6 +336,7 @@ class DaqcoApplication(TaskApplication):
                 raise NotAvailable("DAQCo is closed")
             # One that failed may still be ending; forgotten while it runs, it ends the program.
             self._end_core()
+            self._check_hung()
             settings = self._settings
             # Many more of them on the wall than were asked for would be too many, however fast a
             # simulation runs; but who waits for samples waits for their chunk.
@@ -352,7 +392,21 @@ class DaqcoApplication(TaskApplication):
         core, self._core = self._core, None
         if core is not None:
             core.request_end()
-            core.join()
+            ended = core.join(BRIEFLY_S) if core.given_up else core.join()
+            if not ended:
+                self._hung = core
+
+    def _check_hung(self) -> None:
+        """Raise while a board has not returned from an acquisition that was given up."""
+        core, self._hung = self._hung, None
+        if core is not None and not core.join(BRIEFLY_S):
+            self._hung = core
+            asked = core.asked
+            raise DeviceTimeout(
+                f"{asked[0] if asked else 'a board'}: receive still has not returned, and two "
+                f"threads cannot read one board. Check its cable and its driver, then start again",
+                fault=DeviceFault.TIMEOUT,
+            )
 
     def apply(self, settings: DaqcoSettings) -> None:
         """Put `settings` in force; acquisition goes on with them if it ran.
@@ -448,6 +502,25 @@ class DaqcoApplication(TaskApplication):
                     f"{RESTARTS_S:g} s and stays off now"
                 )
         self.status_changed.emit()
+
+    def _asked(self) -> tuple[str, int] | None:
+        core = self._core
+        return core.asked if core is not None else None
+
+    def _on_hang(self, board: str) -> None:
+        """End an acquisition of which a board does not answer; the watch's thread."""
+        core = self._core
+        if core is None or core.given_up:
+            return
+        core.give_up()
+        error = DeviceTimeout(
+            f"{board}: receive has not returned for {HANG_S:g} s: the board or its driver hangs. "
+            f"Acquisition ended; check its cable and its driver, then start again",
+            fault=DeviceFault.TIMEOUT,
+        )
+        self._on_core_failed(error)
+        # Stopping may be what makes it return, and may hang as well.
+        self._background.do(core.request_end, lambda _result, _error: None)
 
     def _start_again(self, failed: UDaqCore | None, amount: str) -> None:
         """Acquire again after an overrun, unless somebody did something else meanwhile."""

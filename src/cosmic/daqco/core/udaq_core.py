@@ -69,6 +69,17 @@ class UDaqCore(WorkerThread):
         in_order = plan.rows == tuple(range(len(plan.rows)))
         self._rows = None if in_order else np.array(plan.rows)
         self.rate_hz = plan.rate_hz
+        self._given_up = False
+
+    @property
+    def asked(self) -> tuple[str, int] | None:
+        """The board whose `receive` has not returned, and a number of that call."""
+        return self._boards.asked
+
+    @property
+    def given_up(self) -> bool:
+        """A board hangs; nothing more comes, and the thread ends when the board returns."""
+        return self._given_up
 
     @property
     def agreement(self) -> tuple[ClockAgreement, ...]:
@@ -115,14 +126,17 @@ class UDaqCore(WorkerThread):
         try:
             while not self.end_requested:
                 chunk = self._boards.receive(LOOK_S)
-                if chunk is None:
+                if chunk is None or self._given_up:
                     continue
                 if not chunk.first_sample:
                     for each in self.agreement:
                         logger.warning("%s", each.text)
                 self._put(self._scaled(chunk))
         except DeviceError as exc:
-            self.failed.emit(exc)
+            if self._given_up:
+                logger.warning("%s", exc)
+            else:
+                self.failed.emit(exc)
         finally:
             self._boards.stop()
 
@@ -136,6 +150,11 @@ class UDaqCore(WorkerThread):
             volts=volts,
             scales=self._scales,
         )
+
+    def give_up(self) -> None:
+        """Expect nothing more, for a board hangs; returns at once, whatever the board does."""
+        self._given_up = True
+        self._end_requested.set()
 
     @override
     def request_end(self) -> None:

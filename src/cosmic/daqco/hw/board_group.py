@@ -74,6 +74,13 @@ class BoardGroup:
         self._shapes: list[tuple[int, int]] = []
         self._drift_ppm = 2.0 * clock_ppm
         self._agreement: tuple[ClockAgreement, ...] = ()
+        self._calls = 0
+        self._asked: tuple[str, int] | None = None
+
+    @property
+    def asked(self) -> tuple[str, int] | None:
+        """The board whose `receive` has not returned, and a number of that call; any thread."""
+        return self._asked
 
     @property
     def agreement(self) -> tuple[ClockAgreement, ...]:
@@ -156,7 +163,12 @@ class BoardGroup:
         """Return the next chunk of one board; raises `DeviceError`, also where it is none."""
         board = self._boards[number]
         with only_cosmic_errors(board.info.name):
-            piece = board.receive(max(0.0, wait_s))
+            self._calls += 1
+            self._asked = board.info.name, self._calls
+            try:
+                piece = board.receive(max(0.0, wait_s))
+            finally:
+                self._asked = None
             if piece is not None and piece.volts.shape != self._shapes[number]:
                 raise ValueError(
                     f"a chunk of shape {piece.volts.shape} came instead of {self._shapes[number]}"
