@@ -27,7 +27,7 @@ from cosmic.mico.hw.scu3d_ctypes import (
 )
 from cosmic.mico.hw.sim_scu3d_calls import Body, c_function, section_two
 from cosmic.mico.hw.sim_scu3d_device import Device, LibraryLock
-from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
+from cosmic.mico.hw.sim_scu3d_faults import Faults
 from cosmic.mico.hw.sim_scu3d_types import Refusal
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import shipped_settings
@@ -108,12 +108,14 @@ class SimulatedLibrary:
         self._version = _packed(version)
         self.scene = scene
         self.clock = scene.clock
-        self.faults = Faults(self._on_inject, self._on_clear)
+        self.faults = Faults(scene.clock)
         self._lock = LibraryLock()
         self._wired = [
             Device(number, scene, self.faults, self._lock, newest_error=newest_error)
             for number in scene.devices_of("scu3d")
         ]
+        for device in self._wired:
+            self.faults.wire(device, self._lock)
         self._to_open: list[int] = []
         self._opened: list[Device] = []
         self._asynchronous = False
@@ -249,20 +251,3 @@ class SimulatedLibrary:
             return SA_INVALID_PARAMETER_ERROR
         version[0] = _packed(device.settings.firmware_version)
         return SA_OK
-
-    # Faults
-
-    def _on_inject(self, fault: Fault) -> None:
-        with self._lock:
-            now_s = self.clock.now_s()
-            for device in self._hit(fault):
-                device.on_inject(fault, now_s)
-
-    def _on_clear(self, fault: Fault) -> None:
-        with self._lock:
-            now_s = self.clock.now_s()
-            for device in self._hit(fault):
-                device.on_clear(fault, now_s)
-
-    def _hit(self, fault: Fault) -> list[Device]:
-        return [device for device in self._wired if fault.hits(device.number, None)]

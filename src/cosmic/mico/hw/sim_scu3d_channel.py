@@ -6,6 +6,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final
 
+from typing_extensions import override
+
 from cosmic.mico.hw.scu3d_ctypes import (
     SA_CALIBRATING_STATUS,
     SA_COMMAND_OVERRIDDEN_ERROR,
@@ -25,6 +27,7 @@ from cosmic.mico.hw.sim_scu3d_faults import Faults
 from cosmic.mico.hw.sim_scu3d_queue import Packet
 from cosmic.mico.hw.sim_scu3d_scale import FINE_PER_UNIT, CountScale
 from cosmic.mico.hw.sim_scu3d_types import TYPES, Movement, Reference, Refusal, Turn
+from cosmic.mico.hw.sim_wiring import WiredChannel
 from cosmic.twin.scene import AtPowerUp
 from cosmic.twin.settings import ControllerSettings
 from cosmic.twin.stage import Route, Stage
@@ -38,7 +41,7 @@ _MOVEMENTS: Final = (
 )
 
 
-class Channel:
+class Channel(WiredChannel):
     """One channel; everything is called with its library's lock held.
 
     Parameters
@@ -66,12 +69,8 @@ class Channel:
         now_s: float,
         post: Callable[[Packet, float], None],
     ) -> None:
-        self.device = device
-        self.index = index
-        self.stage = stage
-        self.settings = settings
-        self.faults = faults
-        self.random = random.Random(f"channel {device}.{index} {seed}")
+        own = random.Random(f"channel {device}.{index} {seed}")
+        super().__init__(device, index, stage, settings=settings, faults=faults, random=own)
         self._post = post
         # kept without power
         self.positioner_type = stage.kind.positioner_type
@@ -163,12 +162,12 @@ class Channel:
     # Time
 
     @property
+    @override
     def next_turn_s(self) -> float:
-        """When something changes by itself; inf when nothing does."""
         return self._turns[0].time_s if self._turns else math.inf
 
+    @override
     def advance(self, now_s: float) -> None:
-        """Let everything happen that is due by `now_s`."""
         turns = self._turns
         while turns and turns[0].time_s <= now_s:
             turn = turns.popleft()
@@ -203,15 +202,6 @@ class Channel:
         if self._interruptible and self.random.random() < self.settings.double_completed_share:
             self._post_completed(now_s)
         self._turns.clear()
-
-    def obstruct_if_faulty(self, position: float, target: float) -> None:
-        """Put the obstacle of the fault `end_stop` half-way, unless it stands already."""
-        fault = self.faults.find("end_stop", self.device, self.index)
-        if fault is None or self.stage.obstructed or target == position:
-            return
-        low, high = self.stage.kind.low, self.stage.kind.high
-        target = min(max(target, low), high)
-        self.stage.obstruct((position + target) / 2.0, 1 if target > position else -1)
 
     def launch(
         self,
@@ -300,8 +290,8 @@ class Channel:
             if self.status != SA_MOVING_STATUS:
                 self.interrupt(SA_NO_SENSOR_PRESENT_ERROR, now_s)
 
+    @override
     def regain_sensor(self, now_s: float) -> None:
-        """Count on from where it was lost, wherever the stage stands by now."""
         if self._lost_at is not None:
             self.scale.read_as(self.stage.position(now_s), self._lost_at)
             self._lost_at = None

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from threading import Condition, Lock
 from typing import cast
 
+from typing_extensions import override
+
 from cosmic.frame.clock import Clock
 from cosmic.mico.hw.scu3d_ctypes import (
     SA_COMMAND_OVERRIDDEN_ERROR,
@@ -18,9 +20,8 @@ from cosmic.mico.hw.scu3d_ctypes import (
 from cosmic.mico.hw.sim_scu3d_channel import Channel
 from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
 from cosmic.mico.hw.sim_scu3d_queue import Packet, PacketQueue
-from cosmic.twin.scene import AtPowerUp, Scene
-from cosmic.twin.settings import StageKind
-from cosmic.twin.stage import Stage
+from cosmic.mico.hw.sim_wiring import WiredDevice
+from cosmic.twin.scene import Scene
 
 logger = logging.getLogger(__name__)
 
@@ -82,7 +83,7 @@ class LibraryLock:
                 logger.exception("what was left with the simulated library's lock failed")
 
 
-class Device:
+class Device(WiredDevice[Channel]):
     """One unit as the library sees it; called with the library's lock held.
 
     Parameters
@@ -118,11 +119,7 @@ class Device:
         ]
 
     def _channel(self, scene: Scene, index: int, name: str | None) -> Channel:
-        if name is None:
-            stage = Stage(f"nothing at {self.number}.{index}", NOTHING, start=0.0, seed=0)
-            memory = AtPowerUp(known=False, calibrated=False, scale=0.0)
-        else:
-            stage, memory = scene.stages[name], scene.at_power_up[name]
+        stage, memory = self._wired(scene, index, name)
         return Channel(
             self.number,
             index,
@@ -134,11 +131,6 @@ class Device:
             now_s=scene.clock.now_s(),
             post=self.post,
         )
-
-    @property
-    def unplugged(self) -> bool:
-        """Whether the cable is out."""
-        return self.faults.find("unplugged", self.number) is not None
 
     def reported(self, code: int) -> int:
         """Return a status code as this version of the library tells it."""
@@ -158,16 +150,6 @@ class Device:
         self.queue.push(packet, time_s + latency_s)
         self.changed.notify_all()
 
-    def advance(self, now_s: float) -> None:
-        """Let everything happen that is due by `now_s`."""
-        for channel in self.channels:
-            channel.advance(now_s)
-
-    def next_event_s(self, now_s: float) -> float:
-        """Return when something will happen by itself next; inf when nothing will."""
-        turn_s = min(channel.next_turn_s for channel in self.channels)
-        return min(turn_s, self.queue.next_s(now_s))
-
     def open(self, *, asynchronous: bool, reset: bool, now_s: float) -> None:
         """Start to work for a client."""
         self.advance(now_s)
@@ -184,58 +166,13 @@ class Device:
         self.notification = None
         self.changed.notify_all()
 
-    def on_inject(self, fault: Fault, now_s: float) -> None:
-        """Let a new fault act on what goes on."""
-        self.advance(now_s)
-        for channel in self.channels:
-            if fault.hits(self.number, channel.index):
-                _strike(channel, fault, now_s)
-        self.changed.notify_all()
-
-    def on_clear(self, fault: Fault, now_s: float) -> None:
-        """Undo what a fault left behind."""
-        self.advance(now_s)
-        for channel in self.channels:
-            if not fault.hits(self.number, channel.index):
-                continue
-            if fault.name == "sensor_lost":
-                channel.regain_sensor(now_s)
-            elif fault.name == "end_stop":
-                channel.stage.clear_obstruction()
-        self.changed.notify_all()
-
-
-def _strike(channel: Channel, fault: Fault, now_s: float) -> None:
-    if fault.name == "hv_range":
-        channel.hv_error = True
-    if fault.name in _ENDS_MOVEMENTS and (channel.moving or fault.name == "hv_range"):
-        channel.interrupt(_ENDS_MOVEMENTS[fault.name], now_s)
-    elif fault.name == "sensor_lost":
-        channel.lose_sensor(now_s)
-    elif fault.name == "end_stop":
-        channel.meet_obstacle(now_s)
-
-
-# A connector with nothing in it: commands are taken and nothing moves.
-NOTHING = StageKind(
-    unit="um",
-    sensor=False,
-    positioner_type=0,
-    low=0.0,
-    high=0.0,
-    power_up_low=0.0,
-    power_up_high=0.0,
-    reference_mark=0.0,
-    coded_mark_way=1.0,
-    step_at_100v=1.0,
-    threshold_v=10.0,
-    backward_factor=1.0,
-    step_noise=0.0,
-    slow_zone=0.0,
-    slow_factor=1.0,
-    target_threshold=1.0,
-    reference_repeatability=0.0,
-    calibration_span=1.0,
-    drift_per_min_low=0.0,
-    drift_per_min_high=0.0,
-)
+    @override
+    def _strike(self, channel: Channel, fault: Fault, now_s: float) -> None:
+        if fault.name == "hv_range":
+            channel.hv_error = True
+        if fault.name in _ENDS_MOVEMENTS and (channel.moving or fault.name == "hv_range"):
+            channel.interrupt(_ENDS_MOVEMENTS[fault.name], now_s)
+        elif fault.name == "sensor_lost":
+            channel.lose_sensor(now_s)
+        elif fault.name == "end_stop":
+            channel.meet_obstacle(now_s)

@@ -1,9 +1,12 @@
 """Faults of the simulated controller, injected by name."""
 
-from collections.abc import Callable
+from abc import abstractmethod
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from threading import Lock
-from typing import Final
+from typing import Final, Protocol
+
+from cosmic.frame.clock import Clock
 
 NAMES: Final = (
     "unplugged",
@@ -47,6 +50,20 @@ class Fault:
         )
 
 
+class FaultyDevice(Protocol):
+    """What faults strike; called with its lock held."""
+
+    number: int
+
+    @abstractmethod
+    def on_inject(self, fault: Fault, now_s: float) -> None:
+        """Let a new fault act on what goes on."""
+
+    @abstractmethod
+    def on_clear(self, fault: Fault, now_s: float) -> None:
+        """Undo what a fault left behind."""
+
+
 class Faults:
     """Faults in force; any thread.
 
@@ -67,17 +84,19 @@ class Faults:
 
     Parameters
     ----------
-    on_inject, on_clear : callable
-        Called with the fault once it is in force, or no longer.
+    clock : Clock
+        The scene's.
     """
 
-    def __init__(
-        self, on_inject: Callable[[Fault], None], on_clear: Callable[[Fault], None]
-    ) -> None:
-        self._on_inject = on_inject
-        self._on_clear = on_clear
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._devices: list[tuple[FaultyDevice, AbstractContextManager[object]]] = []
         self._lock = Lock()
         self._active: tuple[Fault, ...] = ()
+
+    def wire(self, device: FaultyDevice, lock: AbstractContextManager[object]) -> None:
+        """Have a device told of its faults from now on, with its lock held."""
+        self._devices.append((device, lock))
 
     @property
     def active(self) -> tuple[Fault, ...]:
@@ -107,7 +126,9 @@ class Faults:
         fault = Fault(name, device, channel, 0.5 if delay_s is None else delay_s)
         with self._lock:
             self._active = (*self._active, fault)
-        self._on_inject(fault)
+        for struck, lock in self._hit(fault):
+            with lock:
+                struck.on_inject(fault, self._clock.now_s())
 
     def clear(
         self, name: str | None = None, *, device: int | None = None, channel: int | None = None
@@ -131,7 +152,12 @@ class Faults:
             )
             self._active = tuple(fault for fault in self._active if fault not in ended)
         for fault in ended:
-            self._on_clear(fault)
+            for struck, lock in self._hit(fault):
+                with lock:
+                    struck.on_clear(fault, self._clock.now_s())
+
+    def _hit(self, fault: Fault) -> list[tuple[FaultyDevice, AbstractContextManager[object]]]:
+        return [each for each in self._devices if fault.hits(each[0].number, None)]
 
     def find(self, name: str, device: int, channel: int | None = None) -> Fault | None:
         """Return the fault `name` if it is in force there."""

@@ -197,14 +197,7 @@ def _find_mark(channel: Channel, route: Route, speed: float) -> float | None:
 
 
 def _find_coded_marks(channel: Channel, route: Route, speed: float) -> float | None:
-    kind = channel.stage.kind
-    distance = kind.coded_mark_way if channel.safe_direction else -kind.coded_mark_way
-    if not route.go(route.position + distance, speed) and not route.go(
-        route.position - distance, speed
-    ):
-        return None
-    error = channel.random.uniform(-0.5, 0.5) * kind.reference_repeatability
-    return kind.reference_mark + error
+    return channel.find_coded_marks(route, speed, forward=bool(channel.safe_direction))
 
 
 _FIND: Final[dict[Reference, Callable[[Channel, Route, float], float | None]]] = {

@@ -10,7 +10,7 @@ from typing import Final
 
 from cosmic.frame.clock import Clock, RatedClock
 from cosmic.mico.hw.sim_scu3d_device import Device, LibraryLock
-from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
+from cosmic.mico.hw.sim_scu3d_faults import Faults
 from cosmic.mico.hw.sim_scu3d_types import Refusal
 from cosmic.mico.hw.sim_scu_serial_commands import AnsweredError, Settings, carry_out
 from cosmic.twin.scene import Scene
@@ -222,10 +222,12 @@ class SimulatedScus:
             time = RatedClock(rate) if clock is None else clock
             scene = Scene.from_layout(layout, shipped_settings(), time, seed)
         self.scene = scene
-        self.faults = Faults(self._on_inject, self._on_clear)
+        self.faults = Faults(scene.clock)
         self.units = [
             SimulatedUnit(number, scene, self.faults, baud) for number in scene.devices_of("scu3d")
         ]
+        for unit in self.units:
+            self.faults.wire(unit.device, unit.changed)
 
     def open_port(self, name: str) -> SimulatedLine:
         """Return the line to the unit of this number; raises `OSError` where it is unplugged."""
@@ -233,16 +235,3 @@ class SimulatedScus:
         if unit.unplugged:
             raise OSError("the simulated line is not there")
         return SimulatedLine(unit)
-
-    def _on_inject(self, fault: Fault) -> None:
-        for unit in self._hit(fault):
-            with unit.changed:
-                unit.device.on_inject(fault, unit.clock.now_s())
-
-    def _on_clear(self, fault: Fault) -> None:
-        for unit in self._hit(fault):
-            with unit.changed:
-                unit.device.on_clear(fault, unit.clock.now_s())
-
-    def _hit(self, fault: Fault) -> list[SimulatedUnit]:
-        return [unit for unit in self.units if fault.hits(unit.device.number, None)]

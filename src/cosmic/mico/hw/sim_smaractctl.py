@@ -12,7 +12,7 @@ from typing import Any, Final
 from cosmic.frame.clock import Clock, RatedClock
 from cosmic.mico.hw import smaractctl_ctypes as sa
 from cosmic.mico.hw.sim_scu3d_device import LibraryLock
-from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
+from cosmic.mico.hw.sim_scu3d_faults import Faults
 from cosmic.mico.hw.sim_smaractctl_calls import device_functions, text_out
 from cosmic.mico.hw.sim_smaractctl_device import Device
 from cosmic.mico.hw.sim_smaractctl_types import Refused
@@ -102,12 +102,14 @@ class SimulatedLibrary:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.clock = scene.clock
-        self.faults = Faults(self._on_inject, self._on_clear)
+        self.faults = Faults(scene.clock)
         self._lock = LibraryLock()
         self._wired = [
             Device(number, f"MCS2-{_FIRST_SERIAL + number:08d}", scene, self.faults, self._lock)
             for number in scene.devices_of(MAKE)
         ]
+        for device in self._wired:
+            self.faults.wire(device, self._lock)
         self._handles: dict[int, Device] = {}
         self._next_handle = 1
         self._texts: dict[str, ctypes.Array[ctypes.c_char]] = {}
@@ -221,23 +223,6 @@ class SimulatedLibrary:
             device.cancelled = True
             device.changed.notify_all()
         return sa.SA_CTL_ERROR_NONE
-
-    # Faults
-
-    def _on_inject(self, fault: Fault) -> None:
-        with self._lock:
-            now_s = self.clock.now_s()
-            for device in self._hit(fault):
-                device.on_inject(fault, now_s)
-
-    def _on_clear(self, fault: Fault) -> None:
-        with self._lock:
-            now_s = self.clock.now_s()
-            for device in self._hit(fault):
-                device.on_clear(fault, now_s)
-
-    def _hit(self, fault: Fault) -> list[Device]:
-        return [device for device in self._wired if fault.hits(device.number, None)]
 
 
 def _result_info(code: int) -> str:

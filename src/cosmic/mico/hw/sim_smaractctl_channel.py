@@ -6,9 +6,12 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final
 
+from typing_extensions import override
+
 from cosmic.mico.hw import smaractctl_ctypes as sa
 from cosmic.mico.hw.sim_scu3d_faults import Faults
 from cosmic.mico.hw.sim_smaractctl_types import COUNTS, Phase, Refused, Turn, type_like
+from cosmic.mico.hw.sim_wiring import WiredChannel
 from cosmic.twin.scene import AtPowerUp
 from cosmic.twin.settings import ControllerSettings
 from cosmic.twin.stage import Route, Stage
@@ -24,7 +27,7 @@ _STOPPED_MARKS: Final = (
 _INT64: Final = 2**63 - 1
 
 
-class Channel:
+class Channel(WiredChannel):
     """One channel; everything is called with its library's lock held.
 
     Parameters
@@ -57,12 +60,8 @@ class Channel:
         now_s: float,
         post: Callable[[int, int, int, float], None],
     ) -> None:
-        self.device = device
-        self.index = index
-        self.stage = stage
-        self.settings = settings
-        self.faults = faults
-        self.random = random.Random(f"mcs2 {device}.{index} {seed}")
+        own = random.Random(f"mcs2 {device}.{index} {seed}")
+        super().__init__(device, index, stage, settings=settings, faults=faults, random=own)
         self._post = post
         self._per_unit = COUNTS[stage.unit]
         self.type_code = type_like(stage.kind.positioner_type, stage.unit)
@@ -123,10 +122,6 @@ class Channel:
         ):
             bits |= bit if given else 0
         return bits
-
-    def fault(self, name: str) -> bool:
-        """Whether a fault is in force here."""
-        return self.faults.find(name, self.device, self.index) is not None
 
     # The scale: physical position to counts
 
@@ -194,12 +189,12 @@ class Channel:
     # Time
 
     @property
+    @override
     def next_turn_s(self) -> float:
-        """When something changes by itself; inf when nothing does."""
         return self._turns[0].time_s if self._turns else math.inf
 
+    @override
     def advance(self, now_s: float) -> None:
-        """Let everything happen that is due by `now_s`."""
         turns = self._turns
         while turns and turns[0].time_s <= now_s:
             turn = turns.popleft()
@@ -326,8 +321,8 @@ class Channel:
             if self.phase is not Phase.OPEN_LOOP:
                 self.interrupt(sa.SA_CTL_ERROR_NO_SENSOR_PRESENT, now_s)
 
+    @override
     def regain_sensor(self, now_s: float) -> None:
-        """Count on from where it was lost, wherever the stage stands by now."""
         if self._lost_at is not None:
             self.show(now_s, self._lost_at)
             self._lost_at = None

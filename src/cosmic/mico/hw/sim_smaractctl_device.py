@@ -6,18 +6,20 @@ from dataclasses import dataclass, field
 from threading import Condition, Lock
 from typing import Final, cast
 
+from typing_extensions import override
+
 from cosmic.frame.clock import Clock
 from cosmic.mico.hw import sim_smaractctl_moves as moves
 from cosmic.mico.hw import sim_smaractctl_properties as properties
 from cosmic.mico.hw import smaractctl_ctypes as sa
-from cosmic.mico.hw.sim_scu3d_device import NOTHING, LibraryLock
+from cosmic.mico.hw.sim_scu3d_device import LibraryLock
 from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
 from cosmic.mico.hw.sim_scu3d_queue import PacketQueue
 from cosmic.mico.hw.sim_smaractctl_channel import NOTHING_MOVES, Channel
 from cosmic.mico.hw.sim_smaractctl_types import Refused
-from cosmic.twin.scene import AtPowerUp, Scene
+from cosmic.mico.hw.sim_wiring import WiredDevice
+from cosmic.twin.scene import Scene
 from cosmic.twin.settings import ControllerSettings
-from cosmic.twin.stage import Stage
 
 CHANNELS_PER_MODULE: Final = 3
 DEVICE_INDEX: Final = 0xFFFF
@@ -58,7 +60,7 @@ class Transmission:
     commands: list[Command] = field(default_factory=list)
 
 
-class Device:
+class Device(WiredDevice[Channel]):
     """One controller as the library sees it; called with the library's lock held.
 
     Parameters
@@ -100,11 +102,7 @@ class Device:
         ]
 
     def _channel(self, scene: Scene, index: int, name: str | None) -> Channel:
-        if name is None:
-            stage = Stage(f"nothing at {self.number}.{index}", NOTHING, start=0.0, seed=0)
-            memory = AtPowerUp(known=False, calibrated=False, scale=0.0)
-        else:
-            stage, memory = scene.stages[name], scene.at_power_up[name]
+        stage, memory = self._wired(scene, index, name)
         channel = Channel(
             self.number,
             index,
@@ -118,11 +116,6 @@ class Device:
         )
         properties.power_up(channel)
         return channel
-
-    @property
-    def unplugged(self) -> bool:
-        """Whether the cable is out."""
-        return self.faults.find("unplugged", self.number) is not None
 
     def channel(self, index: int) -> Channel:
         """Return a channel; raises `Refused` where there is none."""
@@ -140,16 +133,6 @@ class Device:
         channel = None if index == DEVICE_INDEX else index
         self.queue.push((event, index, value, 0, 0), time_s + self.latency_s(channel))
         self.changed.notify_all()
-
-    def advance(self, now_s: float) -> None:
-        """Let everything happen that is due by `now_s`."""
-        for channel in self.channels:
-            channel.advance(now_s)
-
-    def next_event_s(self, now_s: float) -> float:
-        """Return when something will happen by itself next; inf when nothing will."""
-        turn_s = min(channel.next_turn_s for channel in self.channels)
-        return min(turn_s, self.queue.next_s(now_s))
 
     def open(self, handle: int) -> None:
         """Start to work for a client; nothing moves, nothing stops."""
@@ -250,39 +233,24 @@ class Device:
 
     # Trouble
 
+    @override
     def on_inject(self, fault: Fault, now_s: float) -> None:
-        """Let a new fault act on what goes on."""
         self.advance(now_s)
         if fault.name == "unplugged":
             self.queue.push((sa.SA_CTL_EVENT_CONNECTION_LOST, DEVICE_INDEX, 0, 0, 0), now_s)
-        for channel in self.channels:
-            if fault.hits(self.number, channel.index):
-                _strike(channel, fault, now_s)
-        self.changed.notify_all()
+        super().on_inject(fault, now_s)
 
-    def on_clear(self, fault: Fault, now_s: float) -> None:
-        """Undo what a fault left behind."""
-        self.advance(now_s)
-        for channel in self.channels:
-            if not fault.hits(self.number, channel.index):
-                continue
-            if fault.name == "sensor_lost":
-                channel.regain_sensor(now_s)
-            elif fault.name == "end_stop":
-                channel.stage.clear_obstruction()
-        self.changed.notify_all()
+    @override
+    def _strike(self, channel: Channel, fault: Fault, now_s: float) -> None:
+        if fault.name == "unplugged":
+            channel.halt(now_s)  # the device stops what was started over that cable
+        elif fault.name in _ENDS and channel.phase not in NOTHING_MOVES:
+            channel.interrupt(_ENDS[fault.name], now_s)
+        elif fault.name == "sensor_lost":
+            channel.lose_sensor(now_s)
+        elif fault.name == "end_stop":
+            channel.meet_obstacle(now_s)
 
 
 def _signed(value: int) -> int:
     return value - 2**64 if value >= 2**63 else value
-
-
-def _strike(channel: Channel, fault: Fault, now_s: float) -> None:
-    if fault.name == "unplugged":
-        channel.halt(now_s)  # the device stops what was started over that cable
-    elif fault.name in _ENDS and channel.phase not in NOTHING_MOVES:
-        channel.interrupt(_ENDS[fault.name], now_s)
-    elif fault.name == "sensor_lost":
-        channel.lose_sensor(now_s)
-    elif fault.name == "end_stop":
-        channel.meet_obstacle(now_s)

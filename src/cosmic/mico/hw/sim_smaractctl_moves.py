@@ -55,7 +55,7 @@ def _drive(channel: Channel, now_s: float, wanted: int) -> None:
     route = channel.begin(now_s)
     channel.target = wanted
     goal = channel.position(target)
-    _obstruct_if_faulty(channel, route.position, goal)
+    channel.obstruct_if_faulty(route.position, goal)
     low, high = channel.stage.bounds
     threshold = channel.stage.kind.target_threshold
     if low - threshold <= goal <= high + threshold:
@@ -165,15 +165,6 @@ def arrive(
     channel.launch(route, turns, now_s=start.time_s, held_until_s=held_until_s)
 
 
-def _obstruct_if_faulty(channel: Channel, position: float, target: float) -> None:
-    """Put the obstacle of the fault `end_stop` half-way, unless it stands already."""
-    if not channel.fault("end_stop") or channel.stage.obstructed or target == position:
-        return
-    low, high = channel.stage.kind.low, channel.stage.kind.high
-    target = min(max(target, low), high)
-    channel.stage.obstruct((position + target) / 2.0, 1 if target > position else -1)
-
-
 def _step(channel: Channel, now_s: float, value: int) -> None:
     if abs(value) > MOST_STEPS:
         raise Refused(sa.SA_CTL_ERROR_INVALID_PARAMETER)
@@ -183,7 +174,7 @@ def _step(channel: Channel, now_s: float, value: int) -> None:
     hertz = channel.value(sa.SA_CTL_PKEY_STEP_FREQUENCY)
     travel = channel.stage.noisy_steps(value, volts)
     duration_s = abs(value) / hertz
-    _obstruct_if_faulty(channel, route.position, route.position + travel)
+    channel.obstruct_if_faulty(route.position, route.position + travel)
     if travel:
         route.go(route.position + travel, abs(travel) / duration_s)
     # At a stop the slider slips: the steps run out where it stands.
@@ -282,15 +273,8 @@ def _find_mark(channel: Channel, route: Route, speed: float) -> float | None:
 
 
 def _find_coded_marks(channel: Channel, route: Route, speed: float) -> float | None:
-    kind = channel.stage.kind
     backward = channel.value(sa.SA_CTL_PKEY_REFERENCING_OPTIONS) & sa.SA_CTL_REF_OPT_BIT_START_DIR
-    travel = -kind.coded_mark_way if backward else kind.coded_mark_way
-    if not route.go(route.position + travel, speed) and not route.go(
-        route.position - travel, speed
-    ):
-        return None
-    error = channel.random.uniform(-0.5, 0.5) * kind.reference_repeatability
-    return kind.reference_mark + error
+    return channel.find_coded_marks(route, speed, forward=not backward)
 
 
 _FIND: Final[dict[int, Callable[[Channel, Route, float], float | None]]] = {
