@@ -7,7 +7,7 @@ set "venv=%root%\.venv"
 set "stamp=%venv%\.cosmic-%~1"
 set "key=%venv%\.cosmic-key"
 
-"%venv%\Scripts\python.exe" -c "import pip" >nul 2>&1 && goto compare
+"%venv%\Scripts\python.exe" "%root%\tools\check_venv.py" place >nul 2>&1 && goto compare
 call :find_python || exit /b 1
 echo Making the virtual environment .venv ... 1>&2
 %python% -m venv --clear "%venv%" || goto no_venv
@@ -18,8 +18,11 @@ rem What an installation depends on; compared with what the last one left.
 >>"%key%" "%venv%\Scripts\python.exe" --version
 >>"%key%" certutil -hashfile "%root%\pyproject.toml" SHA256
 >>"%key%" certutil -hashfile "%root%\constraints.txt" SHA256
-if exist "%stamp%" fc /b "%key%" "%stamp%" >nul 2>&1 && exit /b 0
+if not exist "%stamp%" goto install
+"%venv%\Scripts\python.exe" "%root%\tools\check_venv.py" packages >nul 2>&1 || goto install
+fc /b "%key%" "%stamp%" >nul 2>&1 && exit /b 0
 
+:install
 del /q "%venv%\.cosmic-run" "%venv%\.cosmic-dev" 2>nul
 set "what=%root%"
 if "%~1"=="dev" set "what=%root%[dev]"

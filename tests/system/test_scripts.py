@@ -5,6 +5,7 @@ import re
 import runpy
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -44,20 +45,56 @@ def test_the_steps_of_the_tests_are_the_same_on_windows() -> None:
 
 def test_windows_installs_the_same_and_notices_the_same_changes() -> None:
     there, here = batch("tools/setup.cmd"), shell("tools/setup.sh")
-    for words in (
-        "constraints.txt",
-        "pyproject.toml",
-        "[dev]",
-        "--no-input",
-        "--editable",
-        "(3, 11)",
-    ):
+    options = [
+        set(
+            re.findall(
+                r"(?<=\s)--[\w-]+", "".join(re.findall(rf"-m pip install[\s\S]*?{end}", text))
+            )
+        )
+        for text, end in ((there, r"\|\|"), (here, r'"\$@"'))
+    ]
+    options[1] |= set(re.findall(r"pip_install (--[\w-]+)", here))
+    assert options[0] == options[1] != set()
+    for words in ("constraints.txt", "pyproject.toml", "[dev]", "(3, 11)"):
         assert words in there
         assert words in here
     for stamp in ("run", "dev"):
         assert f".cosmic-{stamp}" in there
     assert r"tools\install_extras.py" in there
     assert "tools/install_extras.py" in here
+
+
+def test_what_must_be_installed_is_looked_for_alike() -> None:
+    known = runpy.run_path(str(ROOT / "tools" / "check_venv.py"))["PACKAGES"]
+    found = re.search(r"find_spec, \(([^)]*)\)", shell("tools/setup.sh"))
+    assert found is not None
+    assert known == tuple(re.findall(r'"(\w+)"', found[1]))
+    for question in ("place", "packages"):
+        assert f'tools\\check_venv.py" {question} >nul' in batch("tools/setup.cmd")
+
+
+def fits(venv: Path, question: str) -> bool:
+    python = venv / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    script = ROOT / "tools" / "check_venv.py"
+    alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    asked = subprocess.run([python, script, question], env=alone, check=False, timeout=60)
+    return asked.returncode == 0
+
+
+def test_an_environment_that_was_moved_or_lacks_something_is_noticed(tmp_path: Path) -> None:
+    made = tmp_path / "a folder" / ".venv"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", made], check=True, timeout=60)
+    (packages_of := next(made.rglob("site-packages"))).joinpath("pip.py").touch()
+    assert fits(made, "place")
+    assert not fits(made, "packages")
+    for name in ("cosmic", "PySide6", "numpy", "pydantic"):
+        packages_of.joinpath(f"{name}.py").touch()
+    assert fits(made, "packages")
+    moved = made.parent.rename(tmp_path / "another") / ".venv"
+    assert not fits(moved, "place")
+    shutil.rmtree(moved)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", moved], check=True, timeout=60)
+    assert not fits(moved, "place"), "it has no pip"
 
 
 def test_extras_without_a_wheel_are_named_and_the_others_are_installed(
