@@ -43,7 +43,7 @@ from cosmic.app.gateways.mcp import McpTools, McpUses
 from cosmic.app.gateways.openapi import described
 from cosmic.app.gateways.plain import to_json
 from cosmic.app.gateways.session import Approve, GatewaySession, Order
-from cosmic.app.gateways.websocket_line import WebSocketLine
+from cosmic.app.gateways.websocket_line import Handover, WebSocketLine
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.clock import WALL
 from cosmic.frame.declaration import Declared, declaration_of
@@ -155,6 +155,7 @@ class HttpGateway:
         self._users = {
             sha256(each.token.encode()).digest(): self._user(each) for each in settings.client
         }
+        self._handover: Handover | None = None  # made in the loop, by the first line
         self._refusals = RefusalCount(WALL)
         self._queues = {
             name: JobQueue(f"{name} over HTTP", station.policy) for name in (*hosts, "", "stops")
@@ -511,7 +512,9 @@ class HttpGateway:
 
     async def _events(self, socket_: WebSocket) -> None:
         await socket_.accept()
-        line = WebSocketLine(socket_)
+        if self._handover is None:
+            self._handover = Handover()
+        line = WebSocketLine(socket_, self._handover)
         user: _User | None = None
         ends: list[Unfollow] = []
         try:

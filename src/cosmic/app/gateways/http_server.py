@@ -51,6 +51,8 @@ class HttpServer(WorkerThread):
                 http="h11",
                 ws="websockets-sansio",
                 ws_max_size=BODY_LIMIT_BYTES,
+                # Each line would compress each message anew, which is most of what lines cost.
+                ws_per_message_deflate=False,
                 ws_ping_interval=PING_S,
                 ws_ping_timeout=PING_S,
                 limit_concurrency=MOST_CONNECTIONS,

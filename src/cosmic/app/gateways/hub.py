@@ -20,6 +20,10 @@ logger = logging.getLogger(__name__)
 
 SHORTEST_S: Final = 0.05
 """What only the newest counts of is told no more often."""
+MOST_TOLD_S: Final = 200.0
+"""So many messages of such a topic are told a second, however many follow it."""
+LONGEST_S: Final = 0.25
+"""It is told that often all the same."""
 
 Text = str | bytes
 Follower = Callable[[str, bool, Text], object]
@@ -40,6 +44,11 @@ class _Topic:
 def message(topic: str, payload: object) -> str:
     """Return a message about a topic as JSON."""
     return json.dumps({"topic": topic, "payload": to_json(payload)}, separators=(",", ":"))
+
+
+def told_every_s(followers: int) -> float:
+    """Return how often what only the newest counts of is told to so many."""
+    return min(max(SHORTEST_S, followers / MOST_TOLD_S), LONGEST_S)
 
 
 class Hub:
@@ -121,7 +130,7 @@ class Hub:
         if not each:
             if now_s < found.due_s:
                 WALL.sleep(found.due_s - now_s)  # in a thread of this topic; newer ones replace it
-            found.due_s = WALL.now_s() + SHORTEST_S
+            found.due_s = WALL.now_s() + told_every_s(len(found.followers))
         text = found.encode(payload)
         if text is None:
             return

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
@@ -14,12 +15,36 @@ from cosmic.app.gateways.hub import Text
 _BACKLOG: Final = 256
 
 
+class Handover:
+    """From threads that publish into a loop: it is woken once for the lines of all."""
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._waiting: deque[Callable[[], None]] = deque()
+        self._woken = False
+
+    def put(self, action: Callable[[], None]) -> None:
+        """Have `action` called in the loop, in order; any thread, returns at once."""
+        self._waiting.append(action)
+        if (
+            not self._woken
+        ):  # what is appended before `_hand_on` lets others wake it, it takes along
+            self._woken = True
+            with suppress(RuntimeError):  # the loop has ended
+                self._loop.call_soon_threadsafe(self._hand_on)
+
+    def _hand_on(self) -> None:
+        self._woken = False
+        while self._waiting:
+            self._waiting.popleft()()
+
+
 class WebSocketLine:
     """The newest of each topic, or each of a few; in the loop of its socket but for `put`."""
 
-    def __init__(self, socket_: WebSocket) -> None:
+    def __init__(self, socket_: WebSocket, handover: Handover) -> None:
         self._socket = socket_
-        self._loop = asyncio.get_running_loop()
+        self._handover = handover
         self._woken = asyncio.Event()
         self._newest: dict[str, Text] = {}
         self._all: list[Text] = []
@@ -28,8 +53,7 @@ class WebSocketLine:
 
     def put(self, topic: str, each: bool, text: Text) -> None:
         """Have it sent; any thread, returns at once."""
-        with suppress(RuntimeError):  # the loop has ended
-            self._loop.call_soon_threadsafe(self._put, topic, each, text)
+        self._handover.put(lambda: self._put(topic, each, text))
 
     def _put(self, topic: str, each: bool, text: Text) -> None:
         if not each:
