@@ -26,9 +26,8 @@ class Handover:
     def put(self, action: Callable[[], None]) -> None:
         """Have `action` called in the loop, in order; any thread, returns at once."""
         self._waiting.append(action)
-        if (
-            not self._woken
-        ):  # what is appended before `_hand_on` lets others wake it, it takes along
+        # What is appended before `_hand_on` lets others wake it, it takes along.
+        if not self._woken:
             self._woken = True
             with suppress(RuntimeError):  # the loop has ended
                 self._loop.call_soon_threadsafe(self._hand_on)
