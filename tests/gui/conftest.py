@@ -1,6 +1,6 @@
 """Windows over the shipped platform, without the time that its gate's process takes to start."""
 
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping, Set
 from functools import cache
 from pathlib import Path
 from threading import Lock
@@ -18,16 +18,7 @@ from cosmic.mico.core.collision.clear_travel import clear_travel
 from cosmic.mico.core.collision.collision_manager import Answering
 from cosmic.mico.core.collision.model import BodyPair, SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
-
-PATIENCE_MS = 20_000
-
-
-class PatientBot(QtBot):
-    """Waits for a condition as long as a computer may need that does much else."""
-
-    @override
-    def waitUntil(self, callback: Callable[[], bool | None], *, timeout: int = PATIENCE_MS) -> None:
-        super().waitUntil(callback, timeout=timeout)
+from gui.patient_bot import PatientBot
 
 
 @pytest.fixture
@@ -85,11 +76,12 @@ def _cached(path: Path) -> SceneModel:
     return _load_scene(path) if shipped in path.parents else _load_scene.__wrapped__(path)
 
 
-@pytest.fixture(autouse=True)
-def quick_platform(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+@pytest.fixture(autouse=True, scope="module")
+def quick_platform() -> Iterator[None]:
     """Have windows start quickly; the gate's process has tests of its own."""
-    monkeypatch.setattr(collision_manager, "GateProcess", InProcess)
-    monkeypatch.setattr(scene_loader, "load_scene", _cached)
-    # A computer that runs tests is busy; the alarm has tests of its own.
-    monkeypatch.setattr(alarm_watch, "processor_load", lambda: None)
-    yield
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(collision_manager, "GateProcess", InProcess)
+        patch.setattr(scene_loader, "load_scene", _cached)
+        # A computer that runs tests is busy; the alarm has tests of its own.
+        patch.setattr(alarm_watch, "processor_load", lambda: None)
+        yield

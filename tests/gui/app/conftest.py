@@ -1,10 +1,12 @@
 """Windows of the operator over simulated platforms."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QSettings
+from PySide6.QtCore import QCoreApplication, QEvent, QSettings
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.platform import Platform, build_platform
@@ -16,6 +18,7 @@ from cosmic.mico.gui.mico_widget import make_mico_gui
 from cosmic.vico.gui.vico_gui import make_vico_gui
 from gui.app.windows import Make, wait_until_ready
 from gui.mico.panels import show
+from gui.patient_bot import PatientBot
 
 
 @pytest.fixture
@@ -24,9 +27,9 @@ def stored(tmp_path: Path) -> QSettings:
     return QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
 
 
-@pytest.fixture
-def make(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
-    """Make shown windows, by default over the shipped platform with MiCo alone."""
+@contextmanager
+def made_windows(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
+    """Make shown windows, and close them at the end."""
     made: list[OperatorWindow] = []
 
     def make_window(
@@ -52,7 +55,6 @@ def make(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
         )
         window = OperatorWindow(platform, stored, RingBufferHandler(), console=console, host=host)
         made.append(window)
-        qtbot.addWidget(window)
         show(qtbot, window, *size)
         if hardware:
             window.open_hardware()
@@ -61,6 +63,38 @@ def make(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
     yield make_window
     for window in made:
         window.close()
+        window.deleteLater()
+
+
+@pytest.fixture
+def make(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
+    """Make shown windows, by default over the shipped platform with MiCo alone."""
+    with made_windows(qtbot, stored) as make_window:
+        yield make_window
+
+
+@pytest.fixture(scope="module")
+def shared_window(
+    qapp: QApplication,
+    quick_platform: None,
+    request: pytest.FixtureRequest,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[OperatorWindow]:
+    """One of all applications, for tests that leave it as good as they found it."""
+    folder = tmp_path_factory.mktemp("shared")
+    stored = QSettings(str(folder / "window.ini"), QSettings.Format.IniFormat)
+    with pytest.MonkeyPatch.context() as patch:
+        for variable in ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME"):
+            patch.setenv(variable, str(folder))
+        bot = PatientBot(request)
+        with made_windows(bot, stored) as make_window:
+            window = make_window(applications=("mico", "daqco", "vico"))
+            daqco = window.platform.daqco
+            assert daqco is not None
+            # What begins later belongs to the test during which it does.
+            bot.waitUntil(lambda: daqco.running)
+            yield window
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
 
 
 @pytest.fixture
