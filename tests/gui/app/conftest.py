@@ -12,6 +12,7 @@ from pytestqt.qtbot import QtBot
 from cosmic.app.platform import Platform, build_platform
 from cosmic.app.stations.host import StationHost
 from cosmic.app.windows.operator_window import OperatorWindow
+from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.gui.main_widget import make_daqco_gui
 from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.gui.mico_widget import make_mico_gui
@@ -90,7 +91,7 @@ def shared_window(
         with made_windows(bot, stored) as make_window:
             window = make_window(applications=("mico", "daqco", "vico"))
             daqco = window.platform.daqco
-            assert daqco is not None
+            assert isinstance(daqco, DaqcoApplication)
             # What begins later belongs to the test during which it does.
             bot.waitUntil(lambda: daqco.running)
             yield window
