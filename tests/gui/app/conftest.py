@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from PySide6.QtCore import QCoreApplication, QEvent, QSettings
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from cosmic.app.panels.campaign.dock import PANEL
 from cosmic.app.platform import Platform, build_platform
 from cosmic.app.stations.host import StationHost
 from cosmic.app.windows.operator_window import OperatorWindow
@@ -87,6 +89,7 @@ def shared_window(
     with pytest.MonkeyPatch.context() as patch:
         for variable in ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME"):
             patch.setenv(variable, str(folder))
+        import_module(PANEL)  # else a thread of the window does it some time later
         bot = PatientBot(request)
         with made_windows(bot, stored) as make_window:
             window = make_window(applications=("mico", "daqco", "vico"))
