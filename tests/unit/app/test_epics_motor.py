@@ -94,3 +94,16 @@ def test_a_refused_put_at_rest_is_shown_and_keeps_nobody_waiting() -> None:
         assert commander.looks == 1
 
     with_record(act)
+
+
+def test_an_alarm_after_another_one_is_an_alarm() -> None:
+    channel = ca.number(units="um")
+
+    async def body() -> None:
+        for name in ("STOPPED", "NO_LEASE", "LIMIT"):
+            await ca.show(channel, 19.8, ca.ALARMS[name])
+            assert (channel.alarm.status, channel.alarm.severity) == ca.ALARMS[name]
+        await ca.show(channel, 19.8)
+        assert channel.alarm.severity == 0
+
+    asyncio.run(body())

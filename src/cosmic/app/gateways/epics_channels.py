@@ -132,7 +132,8 @@ async def show(channel: Channel, value: object, alarm: Alarm = NO_ALARM, **more:
         return
     channel.said = said
     status, severity = alarm
-    await channel.write(value, status=status, severity=severity, **more)
+    # Verifying, caproto takes an alarm of before back, and with it the one given here.
+    await channel.write(value, verify_value=False, status=status, severity=severity, **more)
 
 
 def _guarded(channel: Channel, put: Put | None) -> Channel:

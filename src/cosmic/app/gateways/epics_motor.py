@@ -66,6 +66,7 @@ class MotorRecord:
         self._commander = commander
         self._moves = 0
         self._in_motion = state.in_motion
+        self._showing = asyncio.Lock()
         self._edge = asyncio.Lock()
         self._alarm: Alarm = ca.NO_ALARM
         limits = state.limits or (0.0, 0.0)
@@ -123,6 +124,13 @@ class MotorRecord:
 
     async def show(self, state: PositionerState) -> None:
         """Show the axis as it is."""
+        async with self._showing:  # an alarm of before must not be written after a newer one
+            await self._show_state(state)
+        self._in_motion = state.in_motion
+        if not self._moves:
+            await self._show_moving()
+
+    async def _show_state(self, state: PositionerState) -> None:
         self._zero, self._newest = state.zero, state
         fields, alarm = self._fields, self._state_alarm(state)
         if state.position is not None:
@@ -136,9 +144,6 @@ class MotorRecord:
         for field, value in (("LLM", low - state.zero), ("HLM", high - state.zero)):
             await ca.show(fields[field], value)
         await ca.show(fields["OFF"], -state.zero)
-        self._in_motion = state.in_motion
-        if not self._moves:
-            await self._show_moving()
 
     async def _show_moving(self) -> None:
         async with self._edge:  # one that says "done" late must not end the next move
