@@ -18,13 +18,13 @@ from cosmic.mico.core.collision.clear_travel import clear_travel
 from cosmic.mico.core.collision.collision_manager import Answering
 from cosmic.mico.core.collision.model import BodyPair, SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
-from gui.patient_bot import PatientBot
+from gui.busy_machine import PatientQtBot
 
 
 @pytest.fixture
 def qtbot(qapp: QApplication, request: pytest.FixtureRequest) -> QtBot:
     """Return the robot of pytest-qt, with more patience."""
-    return PatientBot(request)
+    return PatientQtBot(request)
 
 
 _load_scene = cache(scene_loader.load_scene)

@@ -20,8 +20,8 @@ from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.gui.mico_widget import make_mico_gui
 from cosmic.vico.gui.vico_gui import make_vico_gui
 from gui.app.windows import Make, wait_until_ready
+from gui.busy_machine import PatientQtBot
 from gui.mico.panels import show
-from gui.patient_bot import PatientBot
 
 
 @pytest.fixture
@@ -90,7 +90,7 @@ def shared_window(
         for variable in ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME"):
             patch.setenv(variable, str(folder))
         import_module(PANEL)  # else a thread of the window does it some time later
-        bot = PatientBot(request)
+        bot = PatientQtBot(request)
         with made_windows(bot, stored) as make_window:
             window = make_window(applications=("mico", "daqco", "vico"))
             daqco = window.platform.daqco

@@ -4,15 +4,15 @@ import asyncio
 
 import pytest
 
-from cosmic.app.gateways.hub import LONGEST_S, SHORTEST_S, told_every_s
+from cosmic.app.gateways.hub import LONGEST_S, SHORTEST_S, published_every_s
 from cosmic.app.gateways.websocket_line import Handover
 
 
 @pytest.mark.parametrize(
     ("followers", "every_s"), [(1, SHORTEST_S), (10, SHORTEST_S), (20, 0.1), (500, LONGEST_S)]
 )
-def test_many_followers_are_told_less_often_but_told(followers: int, every_s: float) -> None:
-    assert told_every_s(followers) == pytest.approx(every_s)
+def test_many_followers_get_less_often_what_is_published(followers: int, every_s: float) -> None:
+    assert published_every_s(followers) == pytest.approx(every_s)
 
 
 def test_a_loop_is_woken_once_for_all_that_is_handed_over_from_a_thread() -> None:

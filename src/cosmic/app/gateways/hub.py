@@ -20,7 +20,7 @@ logger = logging.getLogger(__name__)
 
 SHORTEST_S: Final = 0.05
 """What only the newest counts of is told no more often."""
-MOST_TOLD_S: Final = 200.0
+MOST_PUBLISHED_S: Final = 200.0
 """So many messages of such a topic are told a second, however many follow it."""
 LONGEST_S: Final = 0.25
 """It is told that often all the same."""
@@ -46,9 +46,9 @@ def message(topic: str, payload: object) -> str:
     return json.dumps({"topic": topic, "payload": to_json(payload)}, separators=(",", ":"))
 
 
-def told_every_s(followers: int) -> float:
+def published_every_s(followers: int) -> float:
     """Return how often what only the newest counts of is told to so many."""
-    return min(max(SHORTEST_S, followers / MOST_TOLD_S), LONGEST_S)
+    return min(max(SHORTEST_S, followers / MOST_PUBLISHED_S), LONGEST_S)
 
 
 class Hub:
@@ -130,7 +130,7 @@ class Hub:
         if not each:
             if now_s < found.due_s:
                 WALL.sleep(found.due_s - now_s)  # in a thread of this topic; newer ones replace it
-            found.due_s = WALL.now_s() + told_every_s(len(found.followers))
+            found.due_s = WALL.now_s() + published_every_s(len(found.followers))
         text = found.encode(payload)
         if text is None:
             return

@@ -8,7 +8,7 @@ from typing_extensions import override
 PATIENCE_MS = 20_000
 
 
-class PatientBot(QtBot):
+class PatientQtBot(QtBot):
     """Waits for a condition as long as a computer may need that does much else."""
 
     @override
