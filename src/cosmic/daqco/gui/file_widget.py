@@ -286,9 +286,9 @@ class UDaqFileWidget(QWidget):
     def _enable(self, wrong: str) -> None:
         recording, asking = self._daqco.recording, self._question is not None
         reasons = (
+            (bool(self._waits), self._waits),
             (recording.active, "A recording is running"),
             (asking, "Answer the question first"),
-            (bool(self._waits), self._waits),
             (not self._daqco.running, "Nothing is being acquired: start the acquisition first"),
             (bool(wrong), wrong),
         )
