@@ -35,17 +35,16 @@ def one_fibre(rate: float, folder: Path) -> FibreRecord:
 @pytest.mark.timeout(900)
 def test_one_seed_gives_one_result_at_every_rate(tmp_path: Path) -> None:
     found = {}
-    for rate in (2.0, 6.0, 20.0):
+    for rate in (1.0, 4.0, 20.0):
         folder = tmp_path / f"{rate:g}"
         folder.mkdir()
         found[rate] = one_fibre(rate, folder)
-    first = found[2.0]
+    first = found[1.0]
     assert first.bending is not None
     for record in found.values():
         assert record.outcome is Outcome.GOOD
         assert record.bending is not None
-        # No image is taken at the same moment twice: 7 % apart is within both intervals.
-        assert record.bending.ei_n_m2 == pytest.approx(first.bending.ei_n_m2, rel=0.1)
+        assert record.bending.ei_n_m2 == pytest.approx(first.bending.ei_n_m2, rel=0.05)
         assert record.shape.length_um == pytest.approx(first.shape.length_um, rel=0.01)
         # 15 % where the computer is quiet; at the pace of before it was 20 times as long.
         assert record.duration_s == pytest.approx(first.duration_s, rel=0.5)

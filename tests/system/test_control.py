@@ -96,12 +96,12 @@ def test_a_force_is_held_within_its_tolerance_and_another_one_after_it(near: Ben
         loop.aim(20.0)
         assert loop.wait_settled(2.0, timeout_s=20.0) == pytest.approx(20.0, abs=2.0)
         peak_un = loop.trace(20.0).measured.max()
-        assert peak_un < 60.0  # 54 when it is never late
+        assert peak_un < 55.0
         pace = loop.statistics.pace
         assert pace.cycles > 100
         assert pace.period_p50_s == pytest.approx(0.005, abs=0.002)
         if pace.period_p99_s < 0.01:  # else it saw forces of another moment than its positions
-            assert loop.stiffness_un_um == pytest.approx(2.6, rel=0.6)
+            assert loop.stiffness_un_um == pytest.approx(2.1, rel=0.5)
     assert loop.ending == "asked to"
     assert loop.state == "ended"
 

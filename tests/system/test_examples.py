@@ -153,8 +153,7 @@ def test_a_plan_scans_the_force_keeps_images_and_is_refused_a_collision(said: st
 def test_a_recorded_hand_steers_as_a_gamepad_does(said: str) -> None:
     lines = said.splitlines()
     words = [line.split("  ")[0] for line in lines[:-4]]
-    seen = [each for each in words if each != "let go of the sticks"]  # it does not last
-    assert seen[:2] == ["armed", "steering"]
+    assert words[:3] == ["let go of the sticks", "armed", "steering"]
     assert lines[-4] == "stopped: unplugged"
     numbers = [float(line.split()[-2]) for line in lines[-3:]]
     assert numbers[0] == 200.0
