@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from typing import Any
 
 from caproto import CAStatus
@@ -107,3 +108,24 @@ def test_an_alarm_after_another_one_is_an_alarm() -> None:
         assert channel.alarm.severity == 0
 
     asyncio.run(body())
+
+
+def test_an_older_state_that_is_slow_to_write_takes_no_newer_alarm_away() -> None:
+    async def act(record: MotorRecord, _commander: Commander) -> None:
+        channel = record.channels["R.RBV"]
+        write, late = channel.write, asyncio.Event()
+
+        async def slow(value: object, **more: Any) -> None:
+            if not late.is_set():
+                late.set()
+                await asyncio.sleep(0.05)
+            await write(value, **more)
+
+        channel.write = slow
+        older = asyncio.create_task(record.show(replace(STATE, position=3.0)))
+        await late.wait()
+        assert not await put(record, STRANGER, 5.0)
+        await older
+        assert (channel.alarm.status, channel.alarm.severity) == ca.ALARMS["NO_LEASE"]
+
+    with_record(act)
