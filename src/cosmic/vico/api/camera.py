@@ -316,9 +316,9 @@ class CameraHandle(CameraCoordinates, CameraShape, Declared):
     @command(aside=True)
     def await_triggered(self) -> ImageWait:
         """Give the software trigger and begin to wait for its image."""
-        wait = ImageWait(self._thread, self.clock.now_s(), self._transform)
+        since_s = self.clock.now_s()
         self._thread.trigger()
-        return wait
+        return ImageWait(self._thread, since_s, self._transform)
 
     # Machine vision
 

@@ -124,6 +124,7 @@ class LocalImages(CameraImages):
 
     @override
     def triggered(self, timeout_s: float) -> CameraImage:
+        forbid_waiting_here("waiting for an image")  # before anything is exposed
         since_s = self._application.clock.now_s()
         self._unit.thread.trigger()
         return self._unit.thread.next_image(since_s, timeout_s)

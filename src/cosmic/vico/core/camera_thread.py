@@ -336,7 +336,8 @@ class CameraThread(WorkerThread):
             frame = camera.receive(LOOK_S)
             if frame is None:
                 return None
-            mismatch = _mismatch(frame, camera.settings)
+            # Reading them back may cost a brought camera as much as an image.
+            mismatch = _mismatch(frame, self._settings or camera.settings)
         if mismatch:
             self._refuse(camera.info, mismatch)
             return None
