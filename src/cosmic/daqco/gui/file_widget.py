@@ -114,7 +114,6 @@ class UDaqFileWidget(QWidget):
         self._daqco, self._now = daqco, now
         self._question: QMessageBox | None = None
         self._waits = ""
-        self._asked = 0
         self._asking = Asking(daqco, self)
         self._error, self._columns, self._chosen = "", 0, False
         self.base = tipped(QLineEdit("recording"), "Base of the file name")
@@ -343,20 +342,12 @@ class UDaqFileWidget(QWidget):
         self, action: Callable[[], T], on_result: OnResult[T], what: str, *, slow: bool = False
     ) -> None:
         self._error, self._waits = "", what
-        self._asked += 1
-        number = self._asked
         self.refresh()
-
-        def on_answer(result: T | None, error: CosmicError | None) -> None:
-            if number == self._asked:  # else it waits for something newer
-                self._waits = ""
-            on_result(result, error)
-
-        self._asking.ask(action, on_answer, slow=slow)
+        self._asking.ask(action, on_result, slow=slow)
 
     def _answered(self, error: CosmicError | None) -> None:
-        if error is not None:
-            self._error = str(error)
+        self._waits = ""
+        self._error = str(error) if error is not None else ""
         self.refresh()
 
     def _on_named(self, named: NamedFile | None, error: CosmicError | None) -> None:
