@@ -71,7 +71,7 @@ KEPT = {
     "autonomy/bending/inference.py": {"way"},
     "autonomy/bending/span_fit.py": {"way"},
     "twin/settings.py": {"way"},
-    "mico/hw/sim_wiring.py": {"way"},
+    "mico/hw/sim_device.py": {"way"},
     "mico/hw/sim_scu3d_moves.py": {"way"},
     "mico/hw/sim_smaractctl_moves.py": {"way"},
     "testing/controllers.py": {"ways"},  # a suite of other packages sets it

@@ -12,7 +12,7 @@ import cosmic
 from cosmic.app.configuration.platform_file import load_platform
 from cosmic.daqco.hw.sim_faults import NAMES as BOARD_FAULTS
 from cosmic.mico.core.motion.positioner import Confidence
-from cosmic.mico.hw.sim_scu3d_faults import NAMES as FAULTS
+from cosmic.mico.hw.sim_faults import NAMES as FAULTS
 from system.api_names import CLASSES, ENUMS, exceptions, names, signature
 from system.config_tables import SECTIONS, WHOLE_FILES, rows
 from system.docs_blocks import ROOT, table_rows

@@ -7,7 +7,7 @@ from typing import Any, Final, Protocol
 from cosmic.app.configuration.platform_file import PlatformFile, load_twin
 from cosmic.daqco.hw.sim_faults import NAMES as BOARD_NAMES
 from cosmic.frame.clock import Clock
-from cosmic.mico.hw.sim_scu3d_faults import NAMES as CONTROLLER_NAMES
+from cosmic.mico.hw.sim_faults import NAMES as CONTROLLER_NAMES
 from cosmic.twin.plates import Plates
 from cosmic.twin.scene import Scene
 from cosmic.twin.truth import NO_TRUTH, TruthFile

@@ -7,8 +7,8 @@ import pytest
 
 from cosmic.frame.clock import WALL, ManualClock, RatedClock
 from cosmic.mico.hw.scu3d_ctypes import SA_PACKET
+from cosmic.mico.hw.sim_faults import NAMES
 from cosmic.mico.hw.sim_scu3d import load_simulated_library
-from cosmic.mico.hw.sim_scu3d_faults import NAMES
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import shipped_settings
 from unit.mico.sim_client import (

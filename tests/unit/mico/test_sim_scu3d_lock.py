@@ -11,7 +11,7 @@ import pytest
 from tests.unit.mico.sim_client import FOR_EVER, STOPPED, Client
 
 from cosmic.frame.clock import ManualClock
-from cosmic.mico.hw import sim_scu3d, sim_scu3d_device
+from cosmic.mico.hw import sim_device, sim_scu3d
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import shipped_settings
 
@@ -55,7 +55,7 @@ class MeasuredLock:
 @pytest.fixture
 def client(monkeypatch: pytest.MonkeyPatch) -> Client:
     MeasuredLock.made.clear()
-    monkeypatch.setattr(sim_scu3d_device, "Lock", MeasuredLock)
+    monkeypatch.setattr(sim_device, "Lock", MeasuredLock)
     scene = Scene.from_settings(shipped_settings(), ManualClock(auto_advance=True), seed=3)
     return Client(sim_scu3d.load_simulated_library(scene=scene))
 
@@ -185,7 +185,7 @@ def test_what_follows_a_stop_finds_it_carried_out(client: Client) -> None:
 
 
 def test_what_was_left_and_fails_harms_no_other_call(caplog: pytest.LogCaptureFixture) -> None:
-    lock, done = sim_scu3d_device.LibraryLock(), list[str]()
+    lock, done = sim_device.LibraryLock(), list[str]()
 
     def fail() -> None:
         raise ValueError("this")

@@ -7,8 +7,8 @@ from cosmic.frame.plugins import NoOptions
 from cosmic.mico.hw.interface import Controller, ControllerBackend, ControllerContext
 from cosmic.mico.hw.joined import JoinedController
 from cosmic.mico.hw.scu3d import Scu3dController
+from cosmic.mico.hw.sim_faults import Fault, Faults
 from cosmic.mico.hw.sim_scu3d import load_simulated_library as load_simulated_scu3d
-from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
 from cosmic.mico.hw.sim_smaractctl import load_simulated_library as load_simulated_smaractctl
 from cosmic.mico.hw.smaractctl import SmaractCtlController
 from cosmic.twin.scene import Scene

@@ -1,20 +1,75 @@
 """What simulated controllers of all makes are alike in: what hangs on them, and its faults."""
 
+import logging
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Callable, Sequence
 from random import Random
-from threading import Condition
+from threading import Condition, Lock
 from typing import Generic, TypeVar
 
-from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
-from cosmic.mico.hw.sim_scu3d_queue import PacketQueue
+from cosmic.mico.hw.sim_faults import Fault, Faults
+from cosmic.mico.hw.sim_queue import PacketQueue
 from cosmic.twin.scene import AtPowerUp, Scene
 from cosmic.twin.settings import ControllerSettings, StageKind
 from cosmic.twin.stage import Route, Stage
 
+logger = logging.getLogger(__name__)
 
-class WiredChannel(ABC):
+
+class LibraryLock:
+    """The lock of a simulated library, which a stop never waits for; any thread.
+
+    What has to be done with the lock, and is left here while somebody else has it, is done before
+    anybody gets it next: at the latest by whoever has it now, in letting go.
+    """
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._left: deque[Callable[[], object]] = deque()
+
+    def leave(self, work: Callable[[], object]) -> None:
+        """Have `work` done with the lock held, here and now if nobody has it."""
+        self._left.append(work)
+        self._work_off()
+
+    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
+        """Take it, as any lock."""
+        got = self._lock.acquire(blocking, timeout)
+        if got:
+            self._do_what_is_left()
+        return got
+
+    def release(self) -> None:
+        """Let go of it."""
+        self._lock.release()
+        self._work_off()
+
+    def __enter__(self) -> bool:
+        return self.acquire()
+
+    def __exit__(self, *_error: object) -> None:
+        self.release()
+
+    def _work_off(self) -> None:
+        # Again after letting go: what was left in between found the lock taken.
+        while self._left and self._lock.acquire(blocking=False):
+            try:
+                self._do_what_is_left()
+            finally:
+                self._lock.release()
+
+    def _do_what_is_left(self) -> None:
+        while self._left:
+            work = self._left.popleft()
+            try:
+                work()
+            except Exception:  # it is of another call than the one that is under way here
+                logger.exception("what was left with the simulated library's lock failed")
+
+
+class SimulatedChannel(ABC):
     """One channel over its stage; everything is called with its library's lock held.
 
     Parameters
@@ -79,10 +134,10 @@ class WiredChannel(ABC):
         return kind.reference_mark + error
 
 
-C = TypeVar("C", bound=WiredChannel)
+C = TypeVar("C", bound=SimulatedChannel)
 
 
-class WiredDevice(ABC, Generic[C]):
+class SimulatedDevice(ABC, Generic[C]):
     """One controller along the wiring of a scene; called with the library's lock held.
 
     Attributes
@@ -138,7 +193,7 @@ class WiredDevice(ABC, Generic[C]):
     def _strike(self, channel: C, fault: Fault, now_s: float) -> None:
         """Let a new fault act on a channel."""
 
-    def _wired(self, scene: Scene, index: int, name: str | None) -> tuple[Stage, AtPowerUp]:
+    def _stage_at(self, scene: Scene, index: int, name: str | None) -> tuple[Stage, AtPowerUp]:
         """Return what hangs on a connector, and what its channel knows of it at power-up."""
         if name is None:
             stage = Stage(f"nothing at {self.number}.{index}", NOTHING, start=0.0, seed=0)

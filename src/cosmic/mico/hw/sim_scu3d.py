@@ -25,9 +25,10 @@ from cosmic.mico.hw.scu3d_ctypes import (
     SA_OTHER_ERROR,
     SA_WRONG_MODE_ERROR,
 )
+from cosmic.mico.hw.sim_device import LibraryLock
+from cosmic.mico.hw.sim_faults import Faults
 from cosmic.mico.hw.sim_scu3d_calls import Body, c_function, section_two
-from cosmic.mico.hw.sim_scu3d_device import Device, LibraryLock
-from cosmic.mico.hw.sim_scu3d_faults import Faults
+from cosmic.mico.hw.sim_scu3d_device import Device
 from cosmic.mico.hw.sim_scu3d_types import Refusal
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import shipped_settings

@@ -20,11 +20,11 @@ from cosmic.mico.hw.scu3d_ctypes import (
     SA_WRITE_ERROR,
     function_type,
 )
+from cosmic.mico.hw.sim_queue import Packet
 from cosmic.mico.hw.sim_scu3d_channel import Channel
 from cosmic.mico.hw.sim_scu3d_device import Device
 from cosmic.mico.hw.sim_scu3d_operations import OPERATIONS, Operation
 from cosmic.mico.hw.sim_scu3d_properties import SYSTEM_KEYS, system_property
-from cosmic.mico.hw.sim_scu3d_queue import Packet
 from cosmic.mico.hw.sim_scu3d_types import Refusal
 from cosmic.twin.scene import Scene
 

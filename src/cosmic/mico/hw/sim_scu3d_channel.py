@@ -23,11 +23,11 @@ from cosmic.mico.hw.scu3d_ctypes import (
     SA_TARGETING_STATUS,
     SA_TEMP_OVERHEAT_ERROR,
 )
-from cosmic.mico.hw.sim_scu3d_faults import Faults
-from cosmic.mico.hw.sim_scu3d_queue import Packet
+from cosmic.mico.hw.sim_device import SimulatedChannel
+from cosmic.mico.hw.sim_faults import Faults
+from cosmic.mico.hw.sim_queue import Packet
 from cosmic.mico.hw.sim_scu3d_scale import FINE_PER_UNIT, CountScale
 from cosmic.mico.hw.sim_scu3d_types import TYPES, Movement, Reference, Refusal, Turn
-from cosmic.mico.hw.sim_wiring import WiredChannel
 from cosmic.twin.scene import AtPowerUp
 from cosmic.twin.settings import ControllerSettings
 from cosmic.twin.stage import Route, Stage
@@ -41,7 +41,7 @@ _MOVEMENTS: Final = (
 )
 
 
-class Channel(WiredChannel):
+class Channel(SimulatedChannel):
     """One channel; everything is called with its library's lock held.
 
     Parameters

@@ -1,9 +1,6 @@
 """One simulated controller unit: three channels, one queue, one cable."""
 
-import logging
 import random
-from collections import deque
-from collections.abc import Callable
 from threading import Condition, Lock
 from typing import cast
 
@@ -17,13 +14,11 @@ from cosmic.mico.hw.scu3d_ctypes import (
     SA_OTHER_ERROR,
     SA_TEMP_OVERHEAT_ERROR,
 )
+from cosmic.mico.hw.sim_device import LibraryLock, SimulatedDevice
+from cosmic.mico.hw.sim_faults import Fault, Faults
+from cosmic.mico.hw.sim_queue import Packet, PacketQueue
 from cosmic.mico.hw.sim_scu3d_channel import Channel
-from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
-from cosmic.mico.hw.sim_scu3d_queue import Packet, PacketQueue
-from cosmic.mico.hw.sim_wiring import WiredDevice
 from cosmic.twin.scene import Scene
-
-logger = logging.getLogger(__name__)
 
 _ENDS_MOVEMENTS = {
     "overheated": SA_TEMP_OVERHEAT_ERROR,
@@ -32,58 +27,7 @@ _ENDS_MOVEMENTS = {
 }
 
 
-class LibraryLock:
-    """The lock of a simulated library, which a stop never waits for; any thread.
-
-    What has to be done with the lock, and is left here while somebody else has it, is done before
-    anybody gets it next: at the latest by whoever has it now, in letting go.
-    """
-
-    def __init__(self) -> None:
-        self._lock = Lock()
-        self._left: deque[Callable[[], object]] = deque()
-
-    def leave(self, work: Callable[[], object]) -> None:
-        """Have `work` done with the lock held, here and now if nobody has it."""
-        self._left.append(work)
-        self._work_off()
-
-    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
-        """Take it, as any lock."""
-        got = self._lock.acquire(blocking, timeout)
-        if got:
-            self._do_what_is_left()
-        return got
-
-    def release(self) -> None:
-        """Let go of it."""
-        self._lock.release()
-        self._work_off()
-
-    def __enter__(self) -> bool:
-        return self.acquire()
-
-    def __exit__(self, *_error: object) -> None:
-        self.release()
-
-    def _work_off(self) -> None:
-        # Again after letting go: what was left in between found the lock taken.
-        while self._left and self._lock.acquire(blocking=False):
-            try:
-                self._do_what_is_left()
-            finally:
-                self._lock.release()
-
-    def _do_what_is_left(self) -> None:
-        while self._left:
-            work = self._left.popleft()
-            try:
-                work()
-            except Exception:  # it is of another call than the one that is under way here
-                logger.exception("what was left with the simulated library's lock failed")
-
-
-class Device(WiredDevice[Channel]):
+class Device(SimulatedDevice[Channel]):
     """One unit as the library sees it; called with the library's lock held.
 
     Parameters
@@ -119,7 +63,7 @@ class Device(WiredDevice[Channel]):
         ]
 
     def _channel(self, scene: Scene, index: int, name: str | None) -> Channel:
-        stage, memory = self._wired(scene, index, name)
+        stage, memory = self._stage_at(scene, index, name)
         return Channel(
             self.number,
             index,

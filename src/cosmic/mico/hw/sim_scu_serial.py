@@ -9,8 +9,9 @@ from threading import Condition
 from typing import Final
 
 from cosmic.frame.clock import Clock, RatedClock
-from cosmic.mico.hw.sim_scu3d_device import Device, LibraryLock
-from cosmic.mico.hw.sim_scu3d_faults import Faults
+from cosmic.mico.hw.sim_device import LibraryLock
+from cosmic.mico.hw.sim_faults import Faults
+from cosmic.mico.hw.sim_scu3d_device import Device
 from cosmic.mico.hw.sim_scu3d_types import Refusal
 from cosmic.mico.hw.sim_scu_serial_commands import AnsweredError, Settings, carry_out
 from cosmic.twin.scene import Scene

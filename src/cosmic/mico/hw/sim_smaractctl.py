@@ -11,8 +11,8 @@ from typing import Any, Final
 
 from cosmic.frame.clock import Clock, RatedClock
 from cosmic.mico.hw import smaractctl_ctypes as sa
-from cosmic.mico.hw.sim_scu3d_device import LibraryLock
-from cosmic.mico.hw.sim_scu3d_faults import Faults
+from cosmic.mico.hw.sim_device import LibraryLock
+from cosmic.mico.hw.sim_faults import Faults
 from cosmic.mico.hw.sim_smaractctl_calls import device_functions, text_out
 from cosmic.mico.hw.sim_smaractctl_device import Device
 from cosmic.mico.hw.sim_smaractctl_types import Refused

@@ -9,9 +9,9 @@ from typing import Final
 from typing_extensions import override
 
 from cosmic.mico.hw import smaractctl_ctypes as sa
-from cosmic.mico.hw.sim_scu3d_faults import Faults
+from cosmic.mico.hw.sim_device import SimulatedChannel
+from cosmic.mico.hw.sim_faults import Faults
 from cosmic.mico.hw.sim_smaractctl_types import COUNTS, Phase, Refused, Turn, type_like
-from cosmic.mico.hw.sim_wiring import WiredChannel
 from cosmic.twin.scene import AtPowerUp
 from cosmic.twin.settings import ControllerSettings
 from cosmic.twin.stage import Route, Stage
@@ -27,7 +27,7 @@ _STOPPED_MARKS: Final = (
 _INT64: Final = 2**63 - 1
 
 
-class Channel(WiredChannel):
+class Channel(SimulatedChannel):
     """One channel; everything is called with its library's lock held.
 
     Parameters

@@ -12,12 +12,11 @@ from cosmic.frame.clock import Clock
 from cosmic.mico.hw import sim_smaractctl_moves as moves
 from cosmic.mico.hw import sim_smaractctl_properties as properties
 from cosmic.mico.hw import smaractctl_ctypes as sa
-from cosmic.mico.hw.sim_scu3d_device import LibraryLock
-from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
-from cosmic.mico.hw.sim_scu3d_queue import PacketQueue
+from cosmic.mico.hw.sim_device import LibraryLock, SimulatedDevice
+from cosmic.mico.hw.sim_faults import Fault, Faults
+from cosmic.mico.hw.sim_queue import PacketQueue
 from cosmic.mico.hw.sim_smaractctl_channel import NOTHING_MOVES, Channel
 from cosmic.mico.hw.sim_smaractctl_types import Refused
-from cosmic.mico.hw.sim_wiring import WiredDevice
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import ControllerSettings
 
@@ -60,7 +59,7 @@ class Transmission:
     commands: list[Command] = field(default_factory=list)
 
 
-class Device(WiredDevice[Channel]):
+class Device(SimulatedDevice[Channel]):
     """One controller as the library sees it; called with the library's lock held.
 
     Parameters
@@ -102,7 +101,7 @@ class Device(WiredDevice[Channel]):
         ]
 
     def _channel(self, scene: Scene, index: int, name: str | None) -> Channel:
-        stage, memory = self._wired(scene, index, name)
+        stage, memory = self._stage_at(scene, index, name)
         channel = Channel(
             self.number,
             index,
