@@ -210,7 +210,7 @@ class _Rules:
         if problem:
             text = (
                 "To take a fibre, go on to Handle. Click-to-move needs a calibration: Calibrate, "
-                "at the left, moves a tool and finds it in the image."
+                "at the left."
             )
             return Step(text, "Handle", self._go("Handle"))
         return Step("The image is calibrated. Choose a tool next.", "Handle", self._go("Handle"))
