@@ -188,17 +188,23 @@ def saturated(span: Span, range_un: float) -> bool:
     return bool(np.max(np.abs(forces), initial=0.0) >= NEAR_RANGE * range_un)
 
 
-def lost_while_pushing(points: Points) -> bool:
-    """Return whether the force fell while the probe went on: fibre broken, or passed by."""
+def lost_while_pushing(points: Points, position_std_um: float) -> bool:
+    """Return whether the force fell while the probe went on: fibre broken, or passed by.
+
+    `position_std_um` is how well positions are known: where a stiff span is touched again, the same
+    position reads another force.
+    """
     out = points.loading
     height = (points.force_un - free_force_un(points))[out]
     travel, std = points.probe_um[out], points.std_un[out]
     if len(travel) < 3:
         return False
     order = np.argsort(travel, kind="stable")
-    highest = np.maximum.accumulate(height[order])
-    clear = highest > 2.0 * CLEAR_SIGMAS * std[order]
-    return bool(np.any(clear & (height[order] < LOST_PART * highest)))
+    travel, height, std = travel[order], height[order], std[order]
+    nearer = np.searchsorted(travel, travel - CLEAR_SIGMAS * position_std_um, side="right")
+    highest = np.concatenate([[-np.inf], np.maximum.accumulate(height)])[nearer]
+    clear = highest > 2.0 * CLEAR_SIGMAS * std
+    return bool(np.any(clear & (height < LOST_PART * highest)))
 
 
 def back_and_forth_percent(points: Points, baseline_un: Floats) -> float:

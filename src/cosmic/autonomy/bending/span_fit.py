@@ -386,7 +386,7 @@ def _flags(
     flags = set()
     if saturated(span, settings.range_un):
         flags.add(Quality.SATURATED)
-    if lost_while_pushing(points):
+    if lost_while_pushing(points, settings.way_std_um):
         flags.add(Quality.BROKEN)
     yielded = _yielded(fit, points, settings, model, values)
     if yielded is not None:
