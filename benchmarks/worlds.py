@@ -25,6 +25,7 @@ from tests.oracles.sealed_session import (
 )
 
 from benchmarks.figures import Figure, main, percentile
+from cosmic.app.blind_trial import UNSEEN
 from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.bending.fit import (
     Certificate,
@@ -132,7 +133,7 @@ def confusion(sessions: int, fibres: int) -> dict[Quality, Counter[str]]:
     for cause, change in PROVOKED.items():
         world, counts = replace(CALM, name=str(cause), **change), Counter[str]()
         for seed in range(sessions):
-            settings = FitSettings(range_un=world.range_un)
+            settings = FitSettings(range_un=world.range_un, **UNSEEN)
             results, _ = session_of(world, 1000 + seed, fibres, settings)
             counts.update(named(each) for each in results)
         found[cause] = counts
@@ -263,7 +264,7 @@ def session_of(
 
 def of_world(world: World, sessions: int, fibres: int) -> Tally:
     """Return what a world's sessions come to."""
-    tally, settings = Tally(), FitSettings()
+    tally, settings = Tally(), FitSettings(**UNSEEN)
     for seed in range(sessions):
         for result, true in zip(*session_of(world, seed, fibres, settings), strict=True):
             tally.add(result, true)

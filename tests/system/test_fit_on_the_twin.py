@@ -1,5 +1,6 @@
 """The analysis on pushes of the twin's fibres, without images: effects alone, and all at once."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ NOISE_UN = 0.06
 FREED_FROM_UN = 1.0
 SLID_UM = 10.0
 NOT_FELT = ("optics", "light", "handling", "kinds.rotary")
+RIGID = {"shear_part": 0.0, "shear_std_part": 0.0}
 RUBS = {"probe_friction": 0.3, "probe_side_un_um": 10.0}
 
 
@@ -78,10 +80,13 @@ def signal(bench: Bench) -> float:
     return float(bench.force_side.sensors["force"]._force_un(np.array([bench.now_s]))[0])
 
 
-def measured(twin: TwinSettings, number: int) -> tuple[MeasuredFibre, float]:
+def measured(
+    twin: TwinSettings, number: int, known: Mapping[str, float]
+) -> tuple[MeasuredFibre, float]:
     """Return a fibre as measured, and what is true of it, N m2."""
-    heard, rng, fit = Heard(), np.random.default_rng(number), FitSettings()
+    heard, rng = Heard(), np.random.default_rng(number)
     bench = Bench(twin, number, heard)
+    fit = FitSettings(fibre_width_um=bench.moment.fibres[0].seen_um, **known)
     spans: list[Span] = []
     guess = FIBRE.ei_n_m2
     while plan := plan_spans(FREE_UM, guess, SpanLimits(), done=spans):
@@ -92,10 +97,13 @@ def measured(twin: TwinSettings, number: int) -> tuple[MeasuredFibre, float]:
     return measure_fibre(spans, settings=fit), longest["ei_n_m2"]
 
 
-def results(twins: list[TwinSettings]) -> list[tuple[BendingResult, float]]:
+def results(
+    twins: list[TwinSettings], known: Mapping[str, float] | None = None
+) -> list[tuple[BendingResult, float]]:
     """Return what a campaign finds of one fibre of each, and what is true."""
-    kept, truths = zip(*(measured(twin, n) for n, twin in enumerate(twins)), strict=True)
-    return list(zip(fit_campaign(kept, standards=[], settings=FitSettings()), truths, strict=True))
+    known = known or {}
+    kept, truths = zip(*(measured(twin, n, known) for n, twin in enumerate(twins)), strict=True)
+    return list(zip(fit_campaign(kept, settings=FitSettings(**known)), truths, strict=True))
 
 
 def drawn(number: int) -> dict[str, float]:
@@ -116,12 +124,24 @@ def test_ribbons_that_stand_askew_and_rub_on_the_probe_are_as_stiff_as_they_are(
     own = (
         {key: drawn(n)[key] for key in ("plane_ratio", "orientation_deg")} for n in range(FIBRES)
     )
-    found = results([settings(FIBRE.model_copy(update=each), **RUBS) for each in own])
+    found = results([settings(FIBRE.model_copy(update=each), **RUBS) for each in own], RIGID)
     assert all(result.trusted for result, _ in found)
     assert [result.ei_n_m2 / true for result, true in found] == pytest.approx(
         [1.0] * FIBRES, abs=0.05
     )
     assert all(r.ei_low_n_m2 <= true <= r.ei_high_n_m2 for r, true in found)
+
+
+def test_wide_ribbons_on_edge_shear_and_are_as_stiff_as_they_are() -> None:
+    edge = {"plane_ratio": 1.2, "orientation_deg": 90.0, "shear_ratio": 20.0}
+    own = (FIBRE.model_copy(update={**edge, "width_um": 30.0 + 3.0 * n}) for n in range(FIBRES))
+    twins = [settings(each, clamp_depth_um=15.0) for each in own]
+    found = results(twins)
+    assert [result.ei_n_m2 / true for result, true in found] == pytest.approx(
+        [1.0] * FIBRES, abs=0.05
+    )
+    assert all(r.ei_low_n_m2 <= true <= r.ei_high_n_m2 for r, true in found)
+    assert [r.clamp_offset_um for r, _ in found] == pytest.approx([15.0] * FIBRES, abs=10.0)
 
 
 def test_what_creeps_is_as_stiff_as_it_shows_one_second_after_a_step() -> None:

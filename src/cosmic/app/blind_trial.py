@@ -128,6 +128,10 @@ def sealed_program() -> Path:
     raise TrialError("the program of sealed sessions is not installed: name one with --sealed-by")
 
 
+UNSEEN: Final = {"shear_part": 0.6, "shear_std_part": 0.6}
+"""Of fibres that no image shows: how wide they are is not known, and shear goes by that."""
+
+
 class SealedSession:
     """A sealed session in a process of its own; a context manager.
 
@@ -161,7 +165,7 @@ class SealedSession:
         self.certificate = Certificate(
             float(head["standard_ei_n_m2"]), float(head["standard_expanded_part"])
         )
-        self.settings = FitSettings(range_un=float(head["range_un"]))
+        self.settings = FitSettings(range_un=float(head["range_un"]), **UNSEEN)
 
     def __enter__(self) -> Self:
         return self

@@ -39,8 +39,14 @@ ALONG: Final = ("friction along, once it let go", "")
 LEAST_STD: Final = 0.004
 """Of ln(k): a model is no better than this."""
 
-COMMON: Final = ("gain", "gain drift", "friction", "compliance", "contact", "cross-talk", "aside")
-GAIN, DRIFT, FRICTION, COMPLIANCE, CONTACT, CROSS, ASIDE = range(len(COMMON))
+COMMON: Final = (
+    *("gain", "gain drift", "friction", "compliance", "contact", "cross-talk", "aside"),
+    "shear",
+)
+GAIN, DRIFT, FRICTION, COMPLIANCE, CONTACT, CROSS, ASIDE, SHEAR = range(len(COMMON))
+
+GLASS_SHEAR: Final = (0.5, 0.1)
+"""Of a round beam of glass: `FitSettings.shear_part`, and its standard deviation."""
 
 
 def depth_prior(settings: FitSettings) -> tuple[float, float]:
@@ -63,13 +69,13 @@ class Common:
 
     Attributes
     ----------
-    mean : ndarray, shape (7,), float64
+    mean : ndarray, shape (8,), float64
         In the order of `COMMON`: error of ln(gain), its change from begin to end of the campaign,
         friction less that about which spans were fitted, compliance of jaws and sensor less the
         sensor's nominal one (um/uN), place of contact (um), the part of a force along the edge
-        that is read as one across, and how much more than foreseen the probe gives way along the
-        fibre, as a part.
-    covariance : ndarray, shape (7, 7), float64
+        that is read as one across, how much more than foreseen the probe gives way along the
+        fibre, as a part, and how much more than foreseen fibres shear.
+    covariance : ndarray, shape (8, 8), float64
     """
 
     mean: Floats
@@ -96,9 +102,10 @@ def common_prior(settings: FitSettings, *, friction: float | None = None) -> Com
             settings.contact_offset_std_um,
             settings.cross_std_part,
             settings.side_std_part,
+            settings.shear_std_part,
         ]
     )
-    mean = np.array([0.0, 0.0, rubs, jaws, 0.0, 0.0, 0.0])
+    mean = np.array([0.0, 0.0, rubs, jaws, 0.0, 0.0, 0.0, 0.0])
     return Common(mean, np.diag(np.maximum(stds, 1e-9) ** 2))
 
 
@@ -114,7 +121,7 @@ class Readings:
         Their covariance by the scatter of readings.
     span : ndarray, shape (m,), int
         Which span a row belongs to.
-    to_common : ndarray, shape (m, 7), float64
+    to_common : ndarray, shape (m, 8), float64
         Derivatives to what is common.
     own : tuple of (str, str, ndarray, float, float)
         What is each fibre's own beside clamp and variation: name, unit, derivatives, mean and
@@ -164,15 +171,22 @@ def readings_of(
     sign = np.array([each.sign for each in rows])
     friction = np.array([fits[n].by_friction for n in span]) * sign
     contact = response.by_contact[span]
-    to_common = _to_common(fits, rows, friction, response, part)
+    foreseen = settings.shear_part if certified is None else GLASS_SHEAR[0]
+    sheared = settings.fibre_width_um**2 * response.by_square[span]
+    by_shear = -sheared / (1.0 + foreseen * sheared)
+    to_common = _to_common(fits, rows, friction, response, by_shear, part)
     if certified is not None:
-        # Glass rubs otherwise than fibres do.
-        to_common[:, FRICTION] = 0.0
+        # Glass rubs and shears otherwise than fibres do.
+        to_common[:, [FRICTION, SHEAR]] = 0.0
     same = span[:, None] == span[None, :]
     own = _own(response, span, settings, direction)
     freed = None if certified is not None else _freed(fits, rows, settings)
     if certified is not None:
-        own = (*own[2:], ("friction", "", friction, 0.0, settings.friction_std))
+        glass = ("shear", "", by_shear, 0.0, GLASS_SHEAR[1])
+        own = (*own[1:], ("friction", "", friction, 0.0, settings.friction_std), glass)
+    else:
+        differs = settings.shear_own_part * settings.shear_part
+        own = (*own, ("shear of this fibre alone", "", by_shear, 0.0, differs))
     if freed is not None:
         shift, askew = freed
         # The friction along the fibre may have let go as well.
@@ -181,7 +195,7 @@ def readings_of(
         shift = -_between_branches(span, np.log(k))
         askew = np.zeros_like(same, dtype=float) if certified else _askew(sign, same, settings)
     return Readings(
-        log_k=np.log(k) + shift,
+        log_k=np.log(k) + shift + np.log1p(foreseen * sheared),
         noise=_noise(fits, rows, settings),
         span=span,
         to_common=to_common,
@@ -199,6 +213,7 @@ def _to_common(
     rows: Sequence["_Row"],
     friction: Floats,
     response: Response,
+    by_shear: Floats,
     part: float,
 ) -> Floats:
     """Return what the readings answer to the common parameters, a row for each reading."""
@@ -213,6 +228,7 @@ def _to_common(
             response.by_contact[span],
             response.slopes[span],
             np.array([_aside(fits[each.span], each.sign) for each in rows]),
+            by_shear,
         ]
     )
 
@@ -309,7 +325,6 @@ def _own(
     at_um = np.array([each.at_um for each in response.shapes])[span]
     by_scale = response.by_contact[span] * at_um
     return (
-        ("shear", "um2", -response.by_square[span], settings.shear_um2, settings.shear_std_um2),
         ("direction of the fibre", "rad", response.by_direction[span], turned, turned_std),
         ("scale of the stage", "", by_scale, 0.0, settings.way_scale_std_part),
     )
@@ -529,7 +544,7 @@ def budget_of(
         _line("stiffness along the fibre", Kind.B, variation, "", _root(weights, varied)),
     ]
     stds = np.sqrt(np.diag(common.covariance))
-    units = ("", "", "", "um/uN", "um", "", "")
+    units = ("", "", "", "um/uN", "um", "", "", "")
     for number, (name, unit) in enumerate(zip(COMMON_SOURCES, units, strict=True)):
         # What goes together is shared among both by its covariance.
         part = float(by[number] * (common.covariance[number] @ by))

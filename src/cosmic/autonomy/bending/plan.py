@@ -47,18 +47,25 @@ class SpanLimits(StrictModel):
         Longest push.
     highest_un, wanted_un : float
         Force that may be reached, and that is enough for a good fit.
+    clamp_um : float
+        How deep in the jaws a fibre is taken to be clamped: a span bends over as much more.
+    strain_percent, half_um : float
+        Strain that the surface of a fibre may reach, and how far that lies from its middle.
     """
 
     count: int = Field(5, ge=1, le=10)
     shortest_um: float = Field(110.0, gt=0.0)
     longest_um: float = Field(600.0, gt=0.0)
     shortest_part: float = Field(0.2, gt=0.0, lt=1.0)
-    shortest_stroke_um: float = Field(2.0, gt=0.0)
+    shortest_stroke_um: float = Field(3.0, gt=0.0)
     beyond_um: float = Field(80.0, ge=0.0)
     stroke_part: float = Field(0.1, gt=0.0, le=0.2)
     longest_stroke_um: float = Field(40.0, gt=0.0)
     highest_un: float = Field(80.0, gt=0.0)
     wanted_un: float = Field(3.0, gt=0.0)
+    clamp_um: float = Field(25.0, ge=0.0)
+    strain_percent: float = Field(0.5, gt=0.0)
+    half_um: float = Field(15.0, gt=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +118,7 @@ def plan_spans(
     enough = math.sqrt(3.0 * ei * limits.stroke_part / limits.wanted_un)
     longest = min(room_um, max(enough, LEAST_SPREAD * limits.shortest_um))
     clear = (3.0 * ei * limits.shortest_stroke_um / limits.highest_un) ** (1.0 / 3.0)
+    clear -= limits.clamp_um
     shortest = min(max(limits.shortest_um, limits.shortest_part * longest, clear), longest)
     remaining = limits.count - len(done)
     positions = _spread(shortest, longest, limits.count)
@@ -171,8 +179,12 @@ def _farthest(positions: list[float], done: list[float], count: int) -> list[flo
 
 
 def _planned(span_um: float, ei_un_um2: float, limits: SpanLimits) -> PlannedSpan:
-    stiffness = 3.0 * ei_un_um2 / span_um**3
+    lever_um = span_um + limits.clamp_um
+    stiffness = 3.0 * ei_un_um2 / lever_um**3
     stroke = min(
-        limits.stroke_part * span_um, limits.longest_stroke_um, limits.highest_un / stiffness
+        limits.stroke_part * span_um,
+        limits.longest_stroke_um,
+        limits.highest_un / stiffness,
+        0.01 * limits.strain_percent * lever_um**2 / (3.0 * limits.half_um),
     )
     return PlannedSpan(span_um=span_um, stroke_um=stroke, force_un=stiffness * stroke)

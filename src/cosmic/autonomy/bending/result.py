@@ -51,6 +51,7 @@ COMMON_SOURCES: Final = (
     "place of the probe's edge",
     "cross-talk",
     "probe gives way aside",
+    "shear",
 )
 """Contributions to the budget that all fibres of a campaign share, in the order of the fit."""
 

@@ -1,6 +1,8 @@
 """What the fit of a bend test is told about the instrument, and how much it may be wrong."""
 
-from pydantic import Field
+from collections.abc import Mapping
+
+from pydantic import Field, model_validator
 
 from cosmic.frame.config import StrictModel
 
@@ -49,8 +51,11 @@ class FitSettings(StrictModel):
     side_un_um, side_std_part : float
         Stiffness of the probe along the fibre, and how uncertain what it gives way is, as a part
         of that.
-    shear_um2, shear_std_um2 : float
-        What shear adds to the compliance of a span, times the square of the span.
+    shear_part, shear_std_part : float
+        What shear adds to the compliance of a span, over the square of the fibre's width by that of
+        the span: 0.3 times E/G for a rectangular section. A campaign learns it.
+    shear_own_part : float
+        By how much that differs between fibres, as a part of it: sections are no rectangles.
     ei_length_um : float
         Length over which the stiffness of a fibre varies.
     reversal_um : float
@@ -85,11 +90,25 @@ class FitSettings(StrictModel):
     relaxation_std_part: float = Field(0.03, ge=0.0)
     side_un_um: float = Field(10.0, gt=0.0)
     side_std_part: float = Field(0.5, ge=0.0)
-    shear_um2: float = Field(500.0, ge=0.0)
-    shear_std_um2: float = Field(500.0, ge=0.0)
+    shear_part: float = Field(2.5, ge=0.0)
+    shear_std_part: float = Field(4.0, ge=0.0)
+    shear_own_part: float = Field(0.4, ge=0.0)
     ei_length_um: float = Field(150.0, gt=0.0)
     reversal_um: float = Field(0.3, ge=0.0)
     soft_percent: float = Field(30.0, gt=0.0)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _shear_as_it_was_kept(cls, data: object) -> object:
+        """Take over what older records say of shear, in um2 and of any fibre."""
+        if not isinstance(data, Mapping) or not {"shear_um2", "shear_std_um2"} & set(data):
+            return data
+        kept = dict(data)
+        width_um = float(kept.get("fibre_width_um", 30.0))
+        for old, new in (("shear_um2", "shear_part"), ("shear_std_um2", "shear_std_part")):
+            if old in kept:
+                kept[new] = float(kept.pop(old)) / width_um**2
+        return kept
 
     @property
     def radius_um(self) -> float:

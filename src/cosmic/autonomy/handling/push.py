@@ -393,6 +393,8 @@ class OneSpan:
         push, points = self._push, self._points
         step = self._plan.stroke_um / push.steps_out
         top = contact_um + self._plan.stroke_um
+        if points.probe_um[-1] < contact_um - step:  # after sliding; nothing was met up to there
+            yield from self._to(contact_um, push.average_s, loading=True)
         while points.probe_um[-1] < top - 0.5 * step:
             force, before = points.force_un[-1] - base_un, points.force_un[-2] - base_un
             slope = max(0.0, (force - before) / max(points.probe_um[-1] - points.probe_um[-2], 0.5))

@@ -26,8 +26,8 @@ EXACT = FitSettings(
     friction=0.0,
     relaxation_part=0.0,
     relaxation_std_part=1e-4,
-    shear_um2=0.0,
-    shear_std_um2=1.0,
+    shear_part=0.0,
+    shear_std_part=0.001,
 )
 
 

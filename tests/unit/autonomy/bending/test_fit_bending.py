@@ -140,8 +140,9 @@ def test_what_is_known_of_the_offset_beforehand_counts_by_its_certainty() -> Non
 
 def test_one_span_is_as_uncertain_as_its_position_and_the_clamp_together() -> None:
     span = rig().push(300.0, 12.0)
+    alone = {"offset_std_um": 6.0, "shear_part": 0.0, "shear_std_part": 0.0}
     widths = [
-        width_percent(fit_bending([span], settings=FitSettings(offset_std_um=6.0, **more)))
+        width_percent(fit_bending([span], settings=FitSettings(**alone, **more)))
         for more in ({"contact_std_um": 0.1}, {"contact_std_um": 6.0})
     ]
     assert widths[1] == pytest.approx(math.sqrt(2.0) * widths[0], rel=0.1)
