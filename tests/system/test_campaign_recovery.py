@@ -17,6 +17,7 @@ from cosmic.autonomy.campaign.records import Outcome, Pose
 from cosmic.autonomy.campaign.storage_format import DATABASE
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.frame.clock import WALL
 from cosmic.mico.core.motion.positioner import Confidence
 from unit.autonomy.campaign.sample_records import INFO
 from unit.mico.rigs import wait_until
@@ -56,6 +57,7 @@ def test_a_campaign_that_was_killed_goes_on_and_has_each_fibre_once(tmp_path: Pa
     reader = CampaignReader(out)
 
     def carried() -> bool:
+        WALL.sleep(0.05)  # to read it costs the program that writes it
         journal = reader.journal() if (out / DATABASE).exists() and reader.version() else ()
         return [each.operation for each in journal].count("carry to the probe") == 2
 

@@ -87,6 +87,11 @@ def trials() -> list[tuple[int, tuple[str, ...]]]:
     return struck
 
 
+def first_of(given: int | tuple[str, ...]) -> str:
+    """Return how a trial is called."""
+    return str(given) if isinstance(given, int) else f"from {given[0]}"
+
+
 @pytest.fixture(scope="module")
 def plate(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
@@ -97,7 +102,7 @@ def plate(
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize(("plate", "operations"), trials(), indirect=["plate"], ids=str)
+@pytest.mark.parametrize(("plate", "operations"), trials(), indirect=["plate"], ids=first_of)
 def test_stop_and_abort_in_every_operation_end_it_safely_and_nothing_is_lost(
     plate: Bench, operations: tuple[str, ...]
 ) -> None:
