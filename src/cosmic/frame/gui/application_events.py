@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Final
 
-from PySide6.QtCore import QEvent, QObject
+from PySide6.QtCore import QEvent, QObject, QTimer
 from PySide6.QtWidgets import QApplication
 
 from cosmic.frame.overrides import override
@@ -19,14 +19,15 @@ class ApplicationEvents(QObject):
 
     Every event of every widget comes by here, and each costs a wait for the interpreter where
     other threads work; so there is one such filter, and it does no more than look up the class.
-    GUI thread.
+    It begins when the event loop comes to it: making a window is some forty thousand events that
+    nobody waits for. GUI thread.
     """
 
     def __init__(self, app: QApplication) -> None:
         super().__init__(app)
         self.setObjectName(_NAME)
+        self._app = app
         self._handlers: dict[type[QEvent], tuple[tuple[QObject, Handler], ...]] = {}
-        app.installEventFilter(self)
 
     @staticmethod
     def of(app: QApplication) -> "ApplicationEvents":
@@ -38,6 +39,8 @@ class ApplicationEvents(QObject):
 
         It is asked no more once its owner is deleted.
         """
+        if not self._handlers:
+            QTimer.singleShot(0, self._begin)
         for kind in kinds:
             self._handlers[kind] = ((owner, handler), *self._handlers.get(kind, ()))
         owner.destroyed.connect(lambda: self.remove(owner))
@@ -50,6 +53,12 @@ class ApplicationEvents(QObject):
                 self._handlers[kind] = left
             else:
                 self._handlers.pop(kind, None)
+        if not self._handlers:
+            self._app.removeEventFilter(self)
+
+    def _begin(self) -> None:
+        if self._handlers:
+            self._app.installEventFilter(self)
 
     @override
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
