@@ -95,8 +95,8 @@ def test_a_step_size_has_no_sign_and_says_so(
     assert position(card) == 0.0
 
 
-def test_the_target_begins_where_the_axis_stands(still_panel: MicoWidget, qtbot: QtBot) -> None:
-    card = still_panel.cards["left.z"]
+def test_the_target_begins_where_the_axis_stands(panel: MicoWidget, qtbot: QtBot) -> None:
+    card = panel.cards["left.z"]
     entry = field(card, "target")
     qtbot.waitUntil(lambda: entry.value() == pytest.approx(position(card), abs=0.5))
     click(qtbot, card, "MiCoCL_9")
