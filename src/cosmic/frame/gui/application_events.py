@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from PySide6.QtCore import QEvent, QObject, QTimer
+from PySide6.QtGui import QInputEvent
 from PySide6.QtWidgets import QApplication
 
 from cosmic.frame.overrides import override
@@ -19,8 +20,8 @@ class ApplicationEvents(QObject):
 
     Every event of every widget comes by here, and each costs a wait for the interpreter where
     other threads work; so there is one such filter, and it does no more than look up the class.
-    It begins when the event loop comes to it: making a window is some forty thousand events that
-    nobody waits for. GUI thread.
+    What a hand does comes by the event loop, so a filter for that alone begins with it: making a
+    window is some forty thousand events that nobody waits for. GUI thread.
     """
 
     def __init__(self, app: QApplication) -> None:
@@ -39,10 +40,12 @@ class ApplicationEvents(QObject):
 
         It is asked no more once its owner is deleted.
         """
-        if not self._handlers:
-            QTimer.singleShot(0, self._begin)
         for kind in kinds:
             self._handlers[kind] = ((owner, handler), *self._handlers.get(kind, ()))
+        if all(issubclass(kind, QInputEvent) for kind in kinds):
+            QTimer.singleShot(0, self._begin)
+        else:
+            self._begin()
         owner.destroyed.connect(lambda: self.remove(owner))
 
     def remove(self, owner: QObject, *kinds: type[QEvent]) -> None:
