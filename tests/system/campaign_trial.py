@@ -1,4 +1,4 @@
-"""One campaign, struck in one operation again and again, and what must hold every time."""
+"""One campaign, struck in its operations again and again, and what must hold every time."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -38,16 +38,22 @@ class Way:
 
 
 class Trial:
-    """One campaign in one folder, which is struck in one operation again and again."""
+    """One campaign in one folder, which is struck in one operation, or in one after the other."""
 
     def __init__(
-        self, bench: Bench, procedure: str, operation: str, way: Way | None = None
+        self, bench: Bench, procedure: str, operation: str, way: Way | None = None, *, good: int = 2
     ) -> None:
         self.bench = bench
         self.operation = operation
         self.way = way or Way()
-        self.recipe = bench.recipe(procedure, good=2, more=self.way.more)
+        self.good = good
+        self.recipe = bench.recipe(procedure, good=good, more=self.way.more)
         self.folder = self.recipe.stem
+
+    def go_on_to(self, operation: str, way: Way) -> None:
+        """Have the same campaign struck in another operation from now on."""
+        assert way.more == self.way.more, "that is another recipe"
+        self.operation, self.way = operation, way
 
     @property
     def reader(self) -> CampaignReader:
@@ -77,7 +83,7 @@ class Trial:
         return campaign
 
     def is_done(self) -> bool:
-        return sum(each.outcome is Outcome.GOOD for each in self.fibres()) >= 2
+        return sum(each.outcome is Outcome.GOOD for each in self.fibres()) >= self.good
 
     def stop(self, *, moving: bool) -> None:
         """Press STOP in the operation, and see that the end is a safe one."""
@@ -147,7 +153,7 @@ class Trial:
         bench = self.bench
         campaign = bench.campaign(self.recipe, self.folder)
         campaign.run_here()
-        assert campaign.end_reason == "2 good fibres"
+        assert campaign.end_reason == f"{self.good} good fibres"
         truth = bench.truth
         found: list[int] = []
         for record in self.fibres():

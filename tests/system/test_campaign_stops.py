@@ -74,9 +74,22 @@ def all_operations() -> dict[str, tuple[str, Way]]:
 OPERATIONS: Final = all_operations()
 
 
-def trials() -> list[tuple[int, str]]:
-    """Return all operations, each with the number of the plate that its fibres are taken from."""
-    return [(number // TESTS_ON_ONE_PLATE, name) for number, name in enumerate(OPERATIONS)]
+def trials() -> list[tuple[int, tuple[str, ...]]]:
+    """Return operations that one campaign is struck in, with the number of its plate."""
+    names = list(OPERATIONS)
+    struck: list[tuple[int, tuple[str, ...]]] = []
+    for first in range(0, len(names), TESTS_ON_ONE_PLATE):
+        here = names[first : first + TESTS_ON_ONE_PLATE]
+        recipes = {(OPERATIONS[name][0], OPERATIONS[name][1].more) for name in here}
+        for recipe in sorted(recipes):
+            of = [n for n in here if (OPERATIONS[n][0], OPERATIONS[n][1].more) == recipe]
+            struck.append((first // TESTS_ON_ONE_PLATE, tuple(of)))
+    return struck
+
+
+def first_of(given: int | tuple[str, ...]) -> str:
+    """Return how a trial is called."""
+    return str(given) if isinstance(given, int) else f"from {given[0]}"
 
 
 @pytest.fixture(scope="module")
@@ -88,18 +101,22 @@ def plate(
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
-@pytest.mark.parametrize(("plate", "operation"), trials(), indirect=["plate"])
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(("plate", "operations"), trials(), indirect=["plate"], ids=first_of)
 def test_stop_and_abort_in_every_operation_end_it_safely_and_nothing_is_lost(
-    plate: Bench, operation: str
+    plate: Bench, operations: tuple[str, ...]
 ) -> None:
-    procedure, way = OPERATIONS[operation]
-    trial = Trial(plate, procedure, operation, way)
-    # By turns, for each way there costs minutes: at rest, in motion, and with an abort before it.
-    number = list(OPERATIONS).index(operation)
-    if number % 3 == 0:
-        trial.abort(moving=True)
-    trial.stop(moving=bool(number % 2))
+    procedure, way = OPERATIONS[operations[0]]
+    trial = Trial(plate, procedure, operations[0], way)
+    for operation in operations:
+        trial.go_on_to(operation, OPERATIONS[operation][1])
+        assert not trial.is_done(), f"{operation!r} can be come to no more: ask for more fibres"
+        # By turns, for each way there costs minutes: at rest, in motion, and an abort before it.
+        number = list(OPERATIONS).index(operation)
+        if number % 3 == 0:
+            trial.abort(moving=True)
+        trial.stop(moving=bool(number % 2))
+    # The way to the end costs most: it is gone once, with all that was cut off behind it.
     trial.finish()
 
 

@@ -72,7 +72,7 @@ def test_a_cold_platform_initialises_without_a_refusal(caplog: pytest.LogCapture
 
 
 def test_an_initialisation_that_was_stopped_half_way_can_be_begun_again() -> None:
-    with cosmic.connect(rate=5.0, cold=True, applications=("mico",)) as rig:
+    with cosmic.connect(rate=10.0, cold=True, applications=("mico",)) as rig:
         task = rig.mico.initialise(wait=False)
         wait_until(lambda: task.progress.fraction > 0.15, 20.0)
         rig.stop("the test wants it")

@@ -92,8 +92,7 @@ class Garbage:
         self._by_hand: dict[int, int] = {}  # with the thread of the widgets
         self._before = gc.get_threshold()
         self._frozen_before = 0
-        self._loaded = 0
-        self._frozen = 0  # counting them takes milliseconds, so it is done after a freeze only
+        self._grown = 0  # what was frozen since the start; to count takes many milliseconds
         self._moved_s = 0.0
         self._collected_s = 0.0
         self._left_behind = False
@@ -133,7 +132,7 @@ class Garbage:
                 self._by_hand[number] = get_ident()
                 gc.disable()
             gc.freeze()
-            self._loaded = self._frozen = gc.get_freeze_count()
+            self._grown = 0
             self._moved_s = self._collected_s = self._now_s()
         return lambda: self._end(number)
 
@@ -164,9 +163,8 @@ class Garbage:
             if any(moves() for moves in list(self._users.values())):
                 self._moved_s = now_s
             rest_s = now_s - self._moved_s
-            frozen = self._frozen - self._loaded
-            many = frozen >= MANY_FROZEN or self._left_behind
-            if frozen >= MOST_FROZEN or (many and rest_s >= LONG_REST_S):
+            many = self._grown >= MANY_FROZEN or self._left_behind
+            if self._grown >= MOST_FROZEN or (many and rest_s >= LONG_REST_S):
                 return self._collect(at_rest=rest_s >= LONG_REST_S, whole=True)
             passes = gc.get_count()[2]  # of young objects, since old ones were looked through
             grown = len(gc.get_objects(generation=2)) if passes else 0
@@ -201,9 +199,10 @@ class Garbage:
         self._collected_s = self._now_s()
         if at_rest:
             give_memory_back()
-        self._frozen = left = gc.get_freeze_count()
+        left = gc.get_freeze_count()
+        self._grown = 0 if whole else self._grown + left - before
         if whole:
-            self._loaded, self._left_behind = left, False
+            self._left_behind = False
         objects = found + (left if whole else left - before)
         done = Collection(objects, found, self._collected_s - began_s, at_rest, whole)
         level = logging.INFO if not at_rest and done.took_s > 0.02 else logging.DEBUG

@@ -14,12 +14,14 @@ Free of Qt; any thread.
 """
 
 import re
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from enum import StrEnum
-from functools import cache
+from functools import cache, lru_cache
 from importlib.metadata import EntryPoint, PackageNotFoundError, distribution, entry_points
+from pathlib import Path
 from typing import Any, Final, Generic, TypeVar
 
 from cosmic.frame.config import StrictModel, check_model
@@ -136,7 +138,7 @@ def plugins(kind: Kind) -> tuple[Plugin, ...]:
 
 def names(kind: Kind) -> tuple[str, ...]:
     """Return the names that the configuration may use."""
-    return tuple(dict.fromkeys(each.name for each in plugins(kind)))
+    return tuple(sorted({each.name for each in _entries(kind)}))
 
 
 @cache
@@ -255,8 +257,22 @@ def make(
 
 
 def _entries(kind: Kind) -> tuple[EntryPoint, ...]:
+    return _entries_along(kind, tuple((place, _changed(place)) for place in sys.path))
+
+
+@lru_cache(maxsize=64)
+def _entries_along(kind: Kind, _places: tuple[tuple[str, int], ...]) -> tuple[EntryPoint, ...]:
+    """Return what the packages along a path announce; all of them are read for it."""
     # One found along two paths, as in a folder that was installed and is run from, counts once.
     return tuple(dict.fromkeys(entry_points(group=kind.value)))
+
+
+def _changed(place: str) -> int:
+    """Return when something was installed in a folder or removed from it, ns; 0: never."""
+    try:
+        return Path(place).stat().st_mtime_ns
+    except OSError:
+        return 0  # such as the archive of the standard library, where there is none
 
 
 def _package(entry: EntryPoint) -> str:

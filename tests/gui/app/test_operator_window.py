@@ -198,7 +198,7 @@ def test_the_console_moves_the_same_platform(make: Make, qtbot: QtBot) -> None:
 
 
 def test_interrupting_the_console_halts_what_moves(make: Make, qtbot: QtBot) -> None:
-    window = make(rate=2.0, console=True, hardware=False)
+    window = make(rate=1.0, console=True, hardware=False)
     panel = ready(window, qtbot)
     console = window.console
     assert console is not None

@@ -21,29 +21,29 @@ from gui.mico.panels import (
 )
 
 
-def test_every_positioner_has_the_card_of_its_kind(panel: MicoWidget) -> None:
-    kinds = {name: type(card) for name, card in panel.cards.items()}
+def test_every_positioner_has_the_card_of_its_kind(still_panel: MicoWidget) -> None:
+    kinds = {name: type(card) for name, card in still_panel.cards.items()}
     assert len(kinds) == 11
     assert kinds["left.x"] is ClosedLoopGUI
     assert kinds["table.rotation"] is ClosedLoopGUI
     assert kinds["left.gripper"] is PositionerBaseGUI
 
 
-def test_cards_have_every_field_of_the_thesis(panel: MicoWidget) -> None:
+def test_cards_have_every_field_of_the_thesis(still_panel: MicoWidget) -> None:
     for number in range(1, 8):
-        part(panel.cards["left.gripper"], f"MiCoOL_{number}", QWidget)
+        part(still_panel.cards["left.gripper"], f"MiCoOL_{number}", QWidget)
     for number in range(1, 14):
-        part(panel.cards["left.x"], f"MiCoCL_{number}", QWidget)
+        part(still_panel.cards["left.x"], f"MiCoCL_{number}", QWidget)
 
 
-def test_groups_are_those_of_the_configuration(panel: MicoWidget) -> None:
-    groups = {group.title: list(group.cards) for group in panel.groups}
+def test_groups_are_those_of_the_configuration(still_panel: MicoWidget) -> None:
+    groups = {group.title: list(group.cards) for group in still_panel.groups}
     assert groups["Left assembly"] == ["left.x", "left.y", "left.z", "left.gripper"]
     assert list(groups) == ["Left assembly", "Right assembly", "Probe and table"]
 
 
-def test_buttons_show_their_text_and_key(panel: MicoWidget) -> None:
-    gripper, table = panel.cards["left.gripper"], panel.cards["table.rotation"]
+def test_buttons_show_their_text_and_key(still_panel: MicoWidget) -> None:
+    gripper, table = still_panel.cards["left.gripper"], still_panel.cards["table.rotation"]
     assert part(gripper, "MiCoOL_3", QAbstractButton).text() == "open [Q]"
     assert part(gripper, "MiCoOL_4", QAbstractButton).text() == "close [E]"
     assert part(table, "MiCoCL_6", QAbstractButton).text() == "turn left [,]"
@@ -82,8 +82,10 @@ def test_a_button_keeps_its_direction_whatever_was_typed_for_go_to(
 
 
 @pytest.mark.parametrize("text", ["-50", "0", "-0.1 mm"])
-def test_a_step_size_has_no_sign_and_says_so(panel: MicoWidget, qtbot: QtBot, text: str) -> None:
-    card = panel.cards["left.x"]
+def test_a_step_size_has_no_sign_and_says_so(
+    still_panel: MicoWidget, qtbot: QtBot, text: str
+) -> None:
+    card = still_panel.cards["left.x"]
     entry = field(card, "MiCoCL_8")
     enter(qtbot, entry, text)
     for name in ("MiCoCL_6", "MiCoCL_7"):
@@ -130,9 +132,9 @@ def test_an_axis_with_sensor_can_make_steps_too(panel: MicoWidget, qtbot: QtBot)
 
 
 def test_a_target_outside_the_travel_is_refused_at_its_field(
-    panel: MicoWidget, qtbot: QtBot
+    still_panel: MicoWidget, qtbot: QtBot
 ) -> None:
-    card = panel.cards["left.x"]
+    card = still_panel.cards["left.x"]
     entry = field(card, "target")
     enter(qtbot, entry, "9 mm")
     click(qtbot, card, "MiCoCL_9")
@@ -145,9 +147,9 @@ def test_a_target_outside_the_travel_is_refused_at_its_field(
 
 @pytest.mark.parametrize("text", ["nan", "inf", "-inf", "abc", "", "5 deg", "3 V", "1,5", "1e999"])
 def test_what_is_no_length_is_refused_and_moves_nothing(
-    panel: MicoWidget, qtbot: QtBot, text: str
+    still_panel: MicoWidget, qtbot: QtBot, text: str
 ) -> None:
-    card = panel.cards["left.x"]
+    card = still_panel.cards["left.x"]
     for entry, name in (
         (field(card, "MiCoCL_8"), "MiCoCL_6"),
         (field(card, "MiCoCL_8"), "MiCoCL_7"),
@@ -176,9 +178,9 @@ def test_what_is_no_length_is_refused_and_moves_nothing(
     ],
 )
 def test_steps_outside_their_range_are_refused(
-    panel: MicoWidget, qtbot: QtBot, name: str, text: str
+    still_panel: MicoWidget, qtbot: QtBot, name: str, text: str
 ) -> None:
-    card = panel.cards["right.gripper"]
+    card = still_panel.cards["right.gripper"]
     before = position(card)
     enter(qtbot, field(card, name), text)
     click(qtbot, card, "MiCoOL_3")
@@ -254,17 +256,17 @@ def test_the_speed_of_moves_is_set_from_the_card(
     assert set_hz == [900]
 
 
-def test_confidence_is_said_by_word_and_shape(panel: MicoWidget) -> None:
-    assert part(panel.cards["left.x"], "chip", ConfidenceMark).text() == "✓ known"
-    assert part(panel.cards["left.gripper"], "chip", ConfidenceMark).text() == "≈ estimated"
+def test_confidence_is_said_by_word_and_shape(still_panel: MicoWidget) -> None:
+    assert part(still_panel.cards["left.x"], "chip", ConfidenceMark).text() == "✓ known"
+    assert part(still_panel.cards["left.gripper"], "chip", ConfidenceMark).text() == "≈ estimated"
 
 
-def test_everything_that_can_be_used_has_a_tooltip(panel: MicoWidget) -> None:
+def test_everything_that_can_be_used_has_a_tooltip(still_panel: MicoWidget) -> None:
     kinds = (QAbstractButton, QuantityField, StateBadge)
     silent = [
         f"{widget.parent().objectName()}/{widget.objectName()}"
         for kind in kinds
-        for widget in panel.findChildren(kind)
+        for widget in still_panel.findChildren(kind)
         if not widget.toolTip() and not widget.objectName().startswith("qt_")
     ]
     assert not silent

@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from typing import Final
 
-from PySide6.QtCore import QEvent, QObject
+from PySide6.QtCore import QEvent, QObject, QTimer
+from PySide6.QtGui import QInputEvent
 from PySide6.QtWidgets import QApplication
 
 from cosmic.frame.overrides import override
@@ -19,14 +20,15 @@ class ApplicationEvents(QObject):
 
     Every event of every widget comes by here, and each costs a wait for the interpreter where
     other threads work; so there is one such filter, and it does no more than look up the class.
-    GUI thread.
+    What a hand does comes by the event loop, so a filter for that alone begins with it: making a
+    window is some forty thousand events that nobody waits for. GUI thread.
     """
 
     def __init__(self, app: QApplication) -> None:
         super().__init__(app)
         self.setObjectName(_NAME)
+        self._app = app
         self._handlers: dict[type[QEvent], tuple[tuple[QObject, Handler], ...]] = {}
-        app.installEventFilter(self)
 
     @staticmethod
     def of(app: QApplication) -> "ApplicationEvents":
@@ -40,6 +42,10 @@ class ApplicationEvents(QObject):
         """
         for kind in kinds:
             self._handlers[kind] = ((owner, handler), *self._handlers.get(kind, ()))
+        if all(issubclass(kind, QInputEvent) for kind in kinds):
+            QTimer.singleShot(0, self._begin)
+        else:
+            self._begin()
         owner.destroyed.connect(lambda: self.remove(owner))
 
     def remove(self, owner: QObject, *kinds: type[QEvent]) -> None:
@@ -50,6 +56,12 @@ class ApplicationEvents(QObject):
                 self._handlers[kind] = left
             else:
                 self._handlers.pop(kind, None)
+        if not self._handlers:
+            self._app.removeEventFilter(self)
+
+    def _begin(self) -> None:
+        if self._handlers:
+            self._app.installEventFilter(self)
 
     @override
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:

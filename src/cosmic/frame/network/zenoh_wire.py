@@ -203,6 +203,7 @@ class _ZenohOutlet(Outlet):
         self._publisher = publisher
         self._lock = Lock()  # it must not be released while another thread asks
         self._closed = False
+        self._putting = 0
 
     @property
     @override
@@ -218,17 +219,30 @@ class _ZenohOutlet(Outlet):
 
     @override
     def put(self, message: bytes) -> None:
+        with self._lock:
+            if self._closed:
+                raise StationAway("the line is closed")
+            self._putting += 1
         try:
             self._publisher.put(message)
         except zenoh.ZError as exc:
             raise StationAway(f"the line is closed: {exc}") from exc
+        finally:
+            with self._lock:
+                self._putting -= 1
+                self._release()
 
     @override
     def close(self) -> None:
         with self._lock:
             if not self._closed:
                 self._closed = True
-                _undeclare(self._publisher)
+                self._release()
+
+    def _release(self) -> None:
+        """Release it when it is closed and nobody puts, which may take a while; locked."""
+        if self._closed and not self._putting:
+            _undeclare(self._publisher)
 
 
 class _ZenohLiveliness(Liveliness):
