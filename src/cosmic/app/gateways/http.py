@@ -363,7 +363,7 @@ class HttpGateway:
         async def call(
             application: str, function: str, arguments: dict[str, Any], keys: tuple[str, ...]
         ) -> object:
-            order = user.session.order(application, function, arguments, keys)
+            order = user.session.order(application, function, arguments, keys, door="mcp")
             queue = "stops" if order.found.mark.at_once else application
             result = await self._carried_out(request, user, order, queue)
             if isinstance(result, Operation):
