@@ -189,6 +189,9 @@ def _guarded(channel: Channel, put: Put | None) -> Channel:
         except (CosmicError, PutRefused) as exc:
             logger.info("EPICS: %s of %s: a write was refused: %s", who.user, who.host, exc)
             return _REFUSED
+        except Exception:  # a defect: caproto would leave the client without an answer
+            logger.exception("EPICS: a write of %s of %s failed", who.user, who.host)
+            return _REFUSED
         return _DONE
 
     channel.auth_write = auth_write

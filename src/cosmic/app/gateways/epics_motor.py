@@ -199,12 +199,14 @@ class MotorRecord:
         allowed = self._commander.may_move(who)
         if self._moves and not allowed:
             raise PutRefused("it moves for another client")  # who is not to notice
+        if shown is not None and not isfinite(shown):
+            raise PutRefused(f"{shown} is not a finite number")
         self._moves += 1
-        self._alarm = ca.NO_ALARM
-        if shown is not None:
-            await self._fields["VAL"].write(shown)
-        await self._show_moving()
         try:
+            self._alarm = ca.NO_ALARM
+            if shown is not None:  # beyond the limits too: the gate refuses it, with its alarm
+                await self._fields["VAL"].write(shown, verify_value=False)
+            await self._show_moving()
             failure = await self._failure(who, motion)
             self._alarm = _alarm_of(failure)
             await ca.show(self._reason, "" if failure is None else str(failure)[:499])
