@@ -199,12 +199,11 @@ class MotorRecord:
         allowed = self._commander.may_move(who)
         if self._moves and not allowed:
             raise PutRefused("it moves for another client")  # who is not to notice
-        if shown is not None and not isfinite(shown):
-            raise PutRefused(f"{shown} is not a finite number")
         self._moves += 1
         try:
             self._alarm = ca.NO_ALARM
-            if shown is not None:  # beyond the limits too: the gate refuses it, with its alarm
+            if shown is not None and isfinite(shown):
+                # Beyond the limits too: the gate refuses it, with its alarm.
                 await self._fields["VAL"].write(shown, verify_value=False)
             await self._show_moving()
             failure = await self._failure(who, motion)
