@@ -1,5 +1,6 @@
 """Plans of bluesky run on the simulated platform, with bluesky's own RunEngine."""
 
+import json
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -512,15 +513,14 @@ def test_a_camera_in_a_scan_keeps_a_fresh_image_of_every_place(
         assert isinstance(camera, protocols.Triggerable | protocols.Configurable)
         with pytest.raises(cosmic.NotAvailable):
             camera.read()
-        camera.plan_images(tmp_path, suffix=".png")
         (tmp_path / f"{camera.name}_00007.png").touch()
-        camera.plan_images(tmp_path, suffix=".png", fibres=True)
+        camera.plan_images(tmp_path, fibres=True)
         engine(scan([camera], rig.mico["right.x"], 0.0, 100.0, 2))
         external = {f"{camera.name}_image"}
         assert camera.read().keys() | external == camera.describe().keys()
         assert set(camera.hints["fields"]) <= camera.read().keys()
         kept = [Path(each[f"{camera.name}_file"]) for each in events(documents)]
-        assert [each.name[-9:] for each in kept] == ["00008.png", "00009.png"]
+        assert [each.name[-9:] for each in kept] == ["00008.tif", "00009.tif"]
         assert all(each.stat().st_size > 10_000 for each in kept)
         first, second = events(documents)
         told = [document for name, document in documents if name.startswith("stream_")]
@@ -529,6 +529,9 @@ def test_a_camera_in_a_scan_keeps_a_fresh_image_of_every_place(
         names = [folder["parameters"]["template"].format(n["indices"]["start"]) for n in images]
         assert names == [each.name for each in kept], "tiled finds the same files"
         assert [each["seq_nums"]["start"] for each in images] == [1, 2]
+        json.dumps(documents)
+        for name, document in documents:
+            schema_validators[DocumentNames[name]].validate(document)
         assert first[f"{camera.name}_frame"] < second[f"{camera.name}_frame"]
         assert first[f"{camera.name}_fibres"] > 0
         assert first[f"{camera.name}_fibre_length_um"] > 500.0
@@ -538,3 +541,19 @@ def test_a_camera_in_a_scan_keeps_a_fresh_image_of_every_place(
         assert f"{camera.name}_file" not in camera.describe()
         status = camera.trigger()
     assert status.exception(5.0) is None or isinstance(status.exception(), cosmic.CosmicError)
+
+
+def test_images_kept_as_png_are_named_by_their_paths_alone(
+    engine: RunEngine, documents: Documents, tmp_path: Path
+) -> None:
+    with cosmic.connect(rate=4.0) as rig:
+        camera = rig.vico.camera()
+        camera.plan_images(tmp_path, suffix=".png")
+        engine(scan([camera], rig.mico["right.x"], 0.0, 20.0, 2))
+    told = [name for name, _ in documents if name.startswith("stream_")]
+    assert told == [], "what writes documents into tiled takes no PNG, and ends the plan"
+    (descriptor,) = (document for name, document in documents if name == "descriptor")
+    assert not any("external" in each for each in descriptor["data_keys"].values())
+    kept = [Path(each[f"{camera.name}_file"]) for each in events(documents)]
+    assert [each.suffix for each in kept] == [".png", ".png"]
+    assert all(each.is_file() for each in kept)

@@ -1,14 +1,21 @@
 """Plans that ship with bluesky run on axes, groups and channels as they are."""
 
+import json
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 from bluesky import RunEngine, plans
+from bluesky.utils import FailedStatus
 from event_model import DocumentNames, schema_validators
 
 import cosmic
+from contract.station_rig import free_port
+from system.docs_blocks import ROOT, blocks
+from system.served_program import served_program
 
+QUEUE = ROOT / "docs" / "how-to" / "queue-plans.md"
 Plan = Callable[[Any, Any, Any], Any]
 
 TRIED: dict[str, tuple[Plan, int]] = {
@@ -48,6 +55,7 @@ def test_a_plan_of_bluesky_runs_unchanged(rig: cosmic.Rig, name: str) -> None:
 
     def hear(kind: str, document: dict[str, Any]) -> None:
         schema_validators[DocumentNames[kind]].validate(document)
+        json.dumps(document)
         if kind == "event":
             read.append(document["data"])
         assert document.get("exit_status", "success") == "success"
@@ -57,3 +65,32 @@ def test_a_plan_of_bluesky_runs_unchanged(rig: cosmic.Rig, name: str) -> None:
     engine(plan(x, y, rig.daqco["force"]))
     assert len(read) >= least
     assert all("force" in each for each in read)
+
+
+@pytest.mark.timeout(120)
+def test_the_startup_script_of_a_queue_names_plans_that_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (script,) = (each for each in blocks(QUEUE) if each.language == "python")
+    line, closers = free_port(), []
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr("atexit.register", closers.append)
+    with served_program(tmp_path, free_port(), line, "--name", "fibers"):
+        names: dict[str, Any] = {}
+        exec(compile(script.text.replace("7447", str(line)), str(QUEUE), "exec"), names)
+        try:
+            engine, rig = names["RE"], names["rig"]
+            for plan in (names["push"](0.0, 5.0, 2), names["look"](1)):
+                engine(plan)
+            with pytest.raises(FailedStatus, match="outside its limit"):
+                engine(names["push"](0.0, 1e6, 2))
+            assert not rig.stations["fibers"].here, "the right to move was given back"
+            with pytest.raises(FailedStatus) as refused:
+                engine(plans.scan([], names["left_x"], 0.0, 5.0, 2))
+            assert isinstance(refused.value.__cause__, cosmic.MoveRefused)
+        finally:
+            for close in closers:
+                close()
+    kept = [each.read_text("utf-8").splitlines() for each in (tmp_path / "runs").iterdir()]
+    assert kept
+    assert all(json.loads(each[0])["name"] == "start" for each in kept)

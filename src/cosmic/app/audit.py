@@ -3,15 +3,19 @@
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
+from threading import Lock
 from types import TracebackType
 from typing import Self
 
 from PySide6.QtCore import QStandardPaths
 
+from cosmic.app.gateways.approvals import Approvals, Asked
 from cosmic.app.platform import Platform
 from cosmic.frame.audit import BEGUN, DONE, REFUSED, AuditEntry, AuditTrail, verdict_of
+from cosmic.frame.clock import WALL
 from cosmic.frame.network.host import KEYS
 from cosmic.frame.network.invoker import Ended
+from cosmic.frame.network.lease import LeaseState
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.travelling_errors import from_plain
 from cosmic.mico.api.application import MicoApplication
@@ -21,6 +25,9 @@ from cosmic.mico.core.motion.stop_latch import StopState
 
 LOCAL = "local"
 GATE = "gate"
+STATION = "station"
+MOST_REFUSED_S = 20.0
+"""So many refusals of clients are written a second: a flood must not push out what was before."""
 
 
 def audit_file() -> Path:
@@ -37,6 +44,7 @@ class PlatformAudit:
         self._trail = AuditTrail(path, platform.policy)
         self._undo = ExitStack()
         self._stop = StopState(None, 0)
+        self._refusals = _Refusals()
 
     @property
     def path(self) -> Path:
@@ -61,9 +69,15 @@ class PlatformAudit:
     ) -> None:
         self._undo.close()
 
-    def join(self, station: Station) -> Callable[[], None]:
-        """Write the calls of all clients of a station; returns the function that ends it."""
+    def join(self, station: Station, approvals: Approvals | None = None) -> Callable[[], None]:
+        """Write the calls of all clients of a station; returns the function that ends it.
+
+        Who has the right to move is written as well, and what a person here approves.
+        """
         undo = ExitStack()
+        undo.callback(station.lease.subscribe(self._on_lease))
+        if approvals is not None:
+            undo.callback(approvals.decided.subscribe(self._on_decision))
         for name, invoker in station.invokers.items():
             undo.callback(invoker.ended.subscribe(self._taker(name)))
         return undo.close
@@ -75,11 +89,25 @@ class PlatformAudit:
             verdict, why = verdict_of(ended.error)
             what = f"{application}.{ended.found.name}"
             said = _said(ended.arguments)
+            if verdict == REFUSED:
+                left_out = self._refusals.admit(WALL.now_s())
+                if left_out is None:
+                    return
+                if left_out:
+                    said["left_out"] = f"{left_out} refusals before this one"
             self._trail.note(
                 AuditEntry(ended.caller.name, ended.caller.door, what, verdict, why, said)
             )
 
         return take
+
+    def _on_lease(self, found: LeaseState) -> None:
+        self._trail.note(AuditEntry(found.holder, STATION, "right to move", DONE, found.why))
+
+    def _on_decision(self, asked: Asked, approved: bool) -> None:
+        verdict = DONE if approved else REFUSED
+        said = {"for": asked.who, "command": asked.what, "arguments": asked.details}
+        self._trail.note(AuditEntry("operator", LOCAL, "approval", verdict, "", said))
 
     def _on_movement(self, news: MovementNews) -> None:
         if isinstance(news, AxisBegun):
@@ -109,6 +137,28 @@ class PlatformAudit:
     def _end(self) -> None:
         self._trail.request_end()
         self._trail.join()
+
+
+class _Refusals:
+    """Lets so many through a second, and counts the others."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._free = MOST_REFUSED_S
+        self._at_s = WALL.now_s()
+        self._left_out = 0
+
+    def admit(self, now_s: float) -> int | None:
+        """Return how many were left out since the last that was let through; None: this one is."""
+        with self._lock:
+            gained = (now_s - self._at_s) * MOST_REFUSED_S
+            self._free, self._at_s = min(MOST_REFUSED_S, self._free + gained), now_s
+            if self._free < 1.0:
+                self._left_out += 1
+                return None
+            self._free -= 1.0
+            found, self._left_out = self._left_out, 0
+            return found
 
 
 def _said(arguments: Mapping[str, object]) -> dict[str, str]:

@@ -37,7 +37,7 @@ class AuditEntry:
     who : str
         Name of the client, or what in this program commanded it: "script", "card", "campaign" ...
     door : str
-        How it came: "local" in this process, or "station", "http", "epics".
+        How it came: "local" in this process, or "station", "http", "mcp", "epics".
     what : str
         The command, such as "mico.axes.begin".
     verdict : str

@@ -10,6 +10,7 @@ from cosmic.app.gateways.session import Order
 from cosmic.frame.clock import WALL
 from cosmic.frame.declaration import Declared, command, state
 from cosmic.frame.errors import CosmicError, NotAvailable, OperationCancelled
+from cosmic.frame.events import Event
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.network.caller import Access, current_call
@@ -57,9 +58,16 @@ class _Waiting:
 
 
 class Approvals(Declared):
-    """The queue of commands that wait for a person; any thread. At last `close`."""
+    """The queue of commands that wait for a person; any thread. At last `close`.
+
+    Attributes
+    ----------
+    decided : Event
+        `decided(asked, approved)` is emitted when a person at this station has decided.
+    """
 
     def __init__(self, policy: FailurePolicy) -> None:
+        self.decided: Event[[Asked, bool]] = Event()
         self._lock = Lock()
         self._numbers = count(1)
         self._waiting: dict[int, _Waiting] = {}
@@ -86,6 +94,7 @@ class Approvals(Declared):
         """
         _check_person()
         found = self._taken(number)
+        self._publish(found.asked, approved=True)
         self._queue.submit(lambda: self._carry_out(found), found.asked.what)
 
     @command
@@ -93,6 +102,7 @@ class Approvals(Declared):
         """Refuse a command; raises as `approve`."""
         _check_person()
         found = self._taken(number)
+        self._publish(found.asked, approved=False)
         found.operation.fail(OperationCancelled(f"the operator refused it. {why}".strip()))
 
     def ask(self, who: str, order: Order, carry_out: Callable[[], object]) -> Operation[Any]:
@@ -123,6 +133,10 @@ class Approvals(Declared):
             each.operation.fail(NotAvailable("the station closes"))
         self._queue.request_end()
         self._queue.join()
+
+    def _publish(self, asked: Asked, *, approved: bool) -> None:
+        if current_call() is None:
+            self.decided.emit(asked, approved)
 
     def _taken(self, number: int) -> _Waiting:
         self._drop_old()

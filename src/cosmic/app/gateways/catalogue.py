@@ -8,7 +8,6 @@ from typing import Any
 from cosmic.frame.declaration import (
     CommandDeclaration,
     Declared,
-    StreamDeclaration,
     declaration_of,
 )
 from cosmic.frame.network.host import command_name
@@ -60,15 +59,6 @@ class Command:
         return self.text.partition("\n")[0]
 
 
-@dataclass(frozen=True, slots=True)
-class Stream:
-    """A stream of an object."""
-
-    place: Place
-    declared: StreamDeclaration
-    text: str
-
-
 def places_of(application: str, kind: type[Declared]) -> Iterator[Place]:
     """Yield the objects of an application: itself, and its parts."""
     yield from _places(Place(application, kind))
@@ -91,11 +81,3 @@ def commands_of(application: str, kind: type[Declared]) -> Iterator[Command]:
             found = inspect.signature(function).parameters.values()
             defaults = {each.name: each.default for each in found if each.default is not each.empty}
             yield Command(place, declared, inspect.getdoc(function) or "", defaults)
-
-
-def streams_of(application: str, kind: type[Declared]) -> Iterator[Stream]:
-    """Yield all streams of an application and its parts."""
-    for place in places_of(application, kind):
-        for name, declared in declaration_of(place.kind).streams.items():
-            text = inspect.getdoc(inspect.getattr_static(place.kind, name)) or ""
-            yield Stream(place, declared, text)

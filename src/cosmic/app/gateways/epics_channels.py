@@ -11,10 +11,12 @@ import caproto
 import numpy as np
 from caproto import AlarmSeverity, AlarmStatus, CAStatus
 from caproto._utils import ConversionDirection
-from caproto.asyncio.server import Context
+from caproto.asyncio.server import Context, VirtualCircuit
+from caproto.server.common import DisconnectedCircuit
 from typing_extensions import override
 
 from cosmic.app.gateways.line_watch import keep_watch
+from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.errors import CallRefused
@@ -22,8 +24,16 @@ from cosmic.frame.threads import WorkerThread
 
 logger = logging.getLogger(__name__)
 
-MOST_CLIENTS: Final = 64
+MOST_CLIENTS: Final = 128
 JSON_LENGTH: Final = 16_000
+LARGEST_MESSAGE: Final = 1 << 18
+"""In bytes; no command is as long, and a head alone may promise 4 GB."""
+MOST_CHANNELS: Final = 2000
+"""So many records, and monitors, one line has."""
+MOST_MONITORED: Final = 32_000_000
+"""Values in all monitors of one line."""
+_ARRAYS_WAITING: Final = 2
+"""So many arrays wait for a client that does not read; the newest count."""
 _START_S: Final = 10.0
 
 _DONE: Final = int(CAStatus.ECA_NORMAL.value.code_with_severity)
@@ -106,23 +116,40 @@ def line(value: str = "", *, put: Put | None = None) -> Channel:
 
 def text(value: str = "", *, put: Put | None = None, length: int = JSON_LENGTH) -> Channel:
     """Return a channel with a long text, as an array of characters."""
-    made = caproto.ChannelChar(value=value, max_length=length, string_encoding="utf-8")
+    made = caproto.ChannelChar(
+        value=value,
+        max_length=length,
+        string_encoding="utf-8",
+        max_subscription_backlog=_ARRAYS_WAITING,
+    )
     return _guarded(made, put)
 
 
 def wave(length: int, units: str = "") -> Channel:
     """Return a channel with an array of floats."""
-    return _guarded(caproto.ChannelDouble(value=[0.0], max_length=length, units=units), None)
+    made = caproto.ChannelDouble(
+        value=[0.0],
+        max_length=length,
+        units=units,
+        max_subscription_backlog=_ARRAYS_WAITING,
+    )
+    return _guarded(made, None)
 
 
 def wholes(length: int) -> Channel:
     """Return a channel with an array of whole numbers."""
-    return _guarded(caproto.ChannelInteger(value=[0], max_length=length), None)
+    made = caproto.ChannelInteger(
+        value=[0], max_length=length, max_subscription_backlog=_ARRAYS_WAITING
+    )
+    return _guarded(made, None)
 
 
 def pixels(length: int) -> Channel:
     """Return a channel with an array of bytes."""
-    return _guarded(caproto.ChannelByte(value=b"\0", max_length=length), None)
+    made = caproto.ChannelByte(
+        value=b"\0", max_length=length, max_subscription_backlog=_ARRAYS_WAITING
+    )
+    return _guarded(made, None)
 
 
 async def show(channel: Channel, value: object, alarm: Alarm = NO_ALARM, **more: Any) -> None:
@@ -162,6 +189,9 @@ def _guarded(channel: Channel, put: Put | None) -> Channel:
         except (CosmicError, PutRefused) as exc:
             logger.info("EPICS: %s of %s: a write was refused: %s", who.user, who.host, exc)
             return _REFUSED
+        except Exception:  # a defect: caproto would leave the client without an answer
+            logger.exception("EPICS: a write of %s of %s failed", who.user, who.host)
+            return _REFUSED
         return _DONE
 
     channel.auth_write = auth_write
@@ -181,6 +211,45 @@ def _value(channel: Channel, data: Any, data_type: Any) -> Any:
         return channel.preprocess_value(found)
     except (caproto.CaprotoError, ValueError, TypeError, IndexError, KeyError) as exc:
         raise CallRefused(f"what was written is of a wrong kind: {str(exc)[:100]}") from exc
+
+
+class _Line(VirtualCircuit):  # type: ignore[misc]  # caproto has no types
+    """One client: what breaks the protocol, or wants too much, ends with its line alone."""
+
+    def __init__(self, *of: Any) -> None:
+        super().__init__(*of)
+        self.since_s = WALL.now_s()
+
+    @override
+    async def recv(self) -> None:
+        await super().recv()
+        if len(self.circuit._data) > LARGEST_MESSAGE:  # noqa: SLF001 - nothing else tells
+            await self._end("a message is too long")
+
+    @override
+    async def command_queue_loop(self) -> None:
+        try:
+            await super().command_queue_loop()
+        except Exception as exc:  # noqa: BLE001 - caproto raises what its own search found
+            logger.info("EPICS: a client broke the protocol: %r", exc)
+        finally:
+            self.client.close()  # caproto leaves it open, and whoever hangs on it moving
+
+    @override
+    async def _process_command(self, command: Any) -> Any:
+        if isinstance(command, caproto.EventAddRequest):
+            held = self.subscriptions.items()
+            values = sum(len(each) * of.db_entry.max_length for of, each in held)
+            if sum(len(each) for _, each in held) >= MOST_CHANNELS or values > MOST_MONITORED:
+                await self._end("it monitors too much")
+        elif len(self.circuit.channels) > MOST_CHANNELS:
+            await self._end("it asks for too many records")
+        return await super()._process_command(command)
+
+    async def _end(self, why: str) -> None:
+        logger.info("EPICS: a line is ended: %s", why)
+        await self._on_disconnect()
+        raise DisconnectedCircuit
 
 
 class ChannelServer(WorkerThread):
@@ -232,6 +301,7 @@ class ChannelServer(WorkerThread):
         if self.end_requested:
             return
         context = Context(self._channels, [self._interface])
+        context.CircuitClass = _Line
         if self._port:
             context.ca_server_port = self._port
         inner = context.circuit_disconnected
@@ -242,7 +312,7 @@ class ChannelServer(WorkerThread):
             await inner(circuit)
 
         async def come(client: Any, address: Any) -> None:
-            if len(context.circuits) >= MOST_CLIENTS:
+            if len(context.circuits) >= MOST_CLIENTS and not _make_room(context.circuits):
                 client.writer.close()
                 return
             keep_watch(client.writer.get_extra_info("socket"))
@@ -296,6 +366,17 @@ class ChannelServer(WorkerThread):
             raise NotAvailable(
                 f"EPICS cannot listen at {self._interface}: {self._problem or 'no answer'}"
             )
+
+
+def _make_room(lines: set[Any]) -> bool:
+    """End the oldest line that never asked for a record; False where each did."""
+    idle = [each for each in lines if not each.circuit.channels]
+    if not idle:
+        return False
+    oldest = min(idle, key=lambda each: float(each.since_s))
+    lines.discard(oldest)
+    oldest.client.close()
+    return True
 
 
 async def _nothing() -> None:

@@ -122,11 +122,12 @@ class MotorRecord:
         self.channels = {name: self._fields["VAL"], f"{name}:reason": self._reason}
         self.channels |= {f"{name}.{field}": each for field, each in self._fields.items()}
 
-    async def show(self, state: PositionerState) -> None:
-        """Show the axis as it is."""
+    async def show(self, state: PositionerState | None = None) -> None:
+        """Show the axis as it is; None: as it was shown last, with the alarm of now."""
         async with self._showing:  # an alarm of before must not be written after a newer one
-            await self._show_state(state)
-        self._in_motion = state.in_motion
+            found = self._newest if state is None else state  # not older than what is shown now
+            await self._show_state(found)
+        self._in_motion = found.in_motion
         if not self._moves:
             await self._show_moving()
 
@@ -200,16 +201,17 @@ class MotorRecord:
         if self._moves and not allowed:
             raise PutRefused("it moves for another client")  # who is not to notice
         self._moves += 1
-        self._alarm = ca.NO_ALARM
-        if shown is not None:
-            await self._fields["VAL"].write(shown)
-        await self._show_moving()
         try:
+            self._alarm = ca.NO_ALARM
+            if shown is not None and isfinite(shown):
+                # Beyond the limits too: the gate refuses it, with its alarm.
+                await self._fields["VAL"].write(shown, verify_value=False)
+            await self._show_moving()
             failure = await self._failure(who, motion)
             self._alarm = _alarm_of(failure)
             await ca.show(self._reason, "" if failure is None else str(failure)[:499])
             # Whoever may not move has moved nothing; many of them are not to keep others waiting.
-            await self.show(await self._commander.look(self._axis) if allowed else self._newest)
+            await self.show(await self._commander.look(self._axis) if allowed else None)
             await asyncio.sleep(EDGE_S)
         finally:
             self._moves -= 1

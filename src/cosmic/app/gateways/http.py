@@ -36,6 +36,7 @@ from cosmic.app.gateways.http_answers import (
     seconds_of,
     word_of,
 )
+from cosmic.app.gateways.http_lines import MOST_LINES, HttpLines
 from cosmic.app.gateways.http_server import BEAT_S, HttpServer, listening
 from cosmic.app.gateways.hub import Hub, Unfollow
 from cosmic.app.gateways.image_files import encoded_image, newest_image, shown_jpeg
@@ -143,7 +144,7 @@ class HttpGateway:
         self._facts = dict(facts)
         self._settings = settings
         kinds: dict[str, type[Declared]] = {name: type(each.served) for name, each in hosts.items()}
-        self._hub = Hub(station, kinds)
+        self._hub = Hub(station, {name: each.served for name, each in hosts.items()})
         self._openapi = described(kinds)
         self._tools = McpTools(kinds)
         self._waiting_s = {
@@ -158,12 +159,14 @@ class HttpGateway:
         self._handover: Handover | None = None  # made in the loop, by the first line
         self._refusals = RefusalCount(WALL)
         self._queues = {
-            name: JobQueue(f"{name} over HTTP", station.policy) for name in (*hosts, "", "stops")
+            name: JobQueue(f"{name} over HTTP", station.policy)
+            for name in (*hosts, "", "stops", "unfollow")
         }
+        self._lines = HttpLines()
         application = self._application()
         self._socket = listening(settings)
         self._server = HttpServer(
-            application, self._socket, settings, station, self._end_silent_motion
+            application, self._socket, settings, station, self._end_silent_motion, self._lines
         )
         self._server.start()
 
@@ -245,6 +248,8 @@ class HttpGateway:
             if self._refusals.note(where) > SLOWED_AFTER:
                 await asyncio.sleep(1.0)
             raise HttpError(401, "send the header Authorization: Bearer TOKEN")
+        if not self._lines.know(request.client, user):
+            raise HttpError(429, f"a client has at most {MOST_LINES} connections")
         now_s = WALL.now_s()
         user.heard_s = now_s
         user.session.beat()
@@ -358,7 +363,7 @@ class HttpGateway:
         async def call(
             application: str, function: str, arguments: dict[str, Any], keys: tuple[str, ...]
         ) -> object:
-            order = user.session.order(application, function, arguments, keys)
+            order = user.session.order(application, function, arguments, keys, door="mcp")
             queue = "stops" if order.found.mark.at_once else application
             result = await self._carried_out(request, user, order, queue)
             if isinstance(result, Operation):
@@ -519,11 +524,14 @@ class HttpGateway:
         ends: list[Unfollow] = []
         try:
             first = await asyncio.wait_for(word_of(socket_), FIRST_WORD_S)
-            user = self._user_of(str(first.get("token", "")))
-            if user is None:
+            found = self._user_of(str(first.get("token", "")))
+            if found is None:
                 await socket_.close(4401, 'the first message is {"token": ...}')
                 return
-            user.lines += 1
+            if not self._lines.know(socket_.client, found):
+                raise HttpError(429, f"a client has at most {MOST_LINES} connections")
+            found.lines += 1
+            user = found
             await line.send(json.dumps({"topic": "hello", "payload": user.settings.name}))
             sending = asyncio.create_task(line.run(user.session.beat))
             try:
@@ -541,9 +549,8 @@ class HttpGateway:
             with suppress(RuntimeError, WebSocketDisconnect):
                 await socket_.close(4400, str(exc)[:100])
         finally:
-            for each in ends:
-                await self._job("", each, "unfollow")
-            self._hung_up(user)
+            self._hung_up(user)  # before all else: what moves ends with the line
+            self._queues["unfollow"].submit(partial(_end_all, ends), "unfollow")
 
     def _hung_up(self, user: _User | None) -> None:
         if user is None:
@@ -572,6 +579,11 @@ _POLICY: Final = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "connect-src 'self' ws: wss:; frame-ancestors 'none'"
 )
+
+
+def _end_all(ends: list[Unfollow]) -> None:
+    for each in ends:
+        each()
 
 
 def _part(kind: type[Declared], name: str) -> tuple[type[Declared], bool]:

@@ -55,7 +55,11 @@ async def body_of(request: Request) -> dict[str, Any]:
 
 async def word_of(socket_: WebSocket) -> dict[str, Any]:
     """Return the next JSON object of a WebSocket; raises `HttpError`."""
-    return _object((await socket_.receive_text()).encode())
+    try:
+        said = await socket_.receive_text()
+    except KeyError:
+        raise HttpError(400, "messages are text, not bytes") from None
+    return _object(said.encode("utf-8", "replace"))
 
 
 def _object(said: bytes) -> dict[str, Any]:

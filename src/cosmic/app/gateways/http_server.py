@@ -3,20 +3,23 @@
 import asyncio
 import socket
 from collections.abc import Callable
-from typing import Final
+from typing import Final, cast
 
 import uvicorn
 from starlette.applications import Starlette
 from typing_extensions import override
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from cosmic.app.configuration.gateways import HttpSettings
+from cosmic.app.gateways.http_lines import HttpLines
 from cosmic.app.gateways.line_watch import keep_watch
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.network.station import Station
 from cosmic.frame.threads import WorkerThread
 
 BODY_LIMIT_BYTES: Final = 64 * 1024
-MOST_CONNECTIONS: Final = 64
+MOST_PENDING: Final = 128
+"""So many lines may wait to be accepted."""
 BEAT_S: Final = 0.2
 PING_S: Final = 0.4
 
@@ -28,6 +31,8 @@ class HttpServer(WorkerThread):
     ----------
     look : callable
         Called every `BEAT_S`; it returns at once.
+    lines : HttpLines
+        Takes note of each line.
     """
 
     def __init__(
@@ -37,25 +42,26 @@ class HttpServer(WorkerThread):
         settings: HttpSettings,
         station: Station,
         look: Callable[[], object],
+        lines: HttpLines,
     ) -> None:
         super().__init__(f"{station.name} over HTTP", station.policy)
         self._bound = bound
         self._lease = station.lease
         self._look = look
+        self._lines = lines
         self._server = uvicorn.Server(
             uvicorn.Config(
                 application,
                 log_config=None,
                 access_log=False,
                 lifespan="off",
-                http="h11",
+                http=_protocol(lines),
                 ws="websockets-sansio",
                 ws_max_size=BODY_LIMIT_BYTES,
                 # Each line would compress each message anew, which is most of what lines cost.
                 ws_per_message_deflate=False,
                 ws_ping_interval=PING_S,
                 ws_ping_timeout=PING_S,
-                limit_concurrency=MOST_CONNECTIONS,
                 timeout_keep_alive=5,
                 timeout_graceful_shutdown=1,
                 h11_max_incomplete_event_size=16 * 1024,
@@ -82,11 +88,23 @@ class HttpServer(WorkerThread):
             await asyncio.sleep(BEAT_S)
             self._lease.poll()
             self._look()
+            self._lines.look()
 
     @override
     def request_end(self) -> None:
         super().request_end()
         self._server.should_exit = True
+
+
+def _protocol(lines: HttpLines) -> type[asyncio.Protocol]:
+    class Line(H11Protocol):
+        @override
+        def connection_made(self, transport: asyncio.BaseTransport) -> None:
+            made = cast("asyncio.Transport", transport)
+            super().connection_made(made)
+            lines.come(self.client, made)
+
+    return Line
 
 
 def listening(settings: HttpSettings) -> socket.socket:
@@ -106,7 +124,7 @@ def listening(settings: HttpSettings) -> socket.socket:
             made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             keep_watch(made)  # what it accepts inherits it
             made.bind((host, port))
-            made.listen(MOST_CONNECTIONS)  # from now on who comes is answered, if a little later
+            made.listen(MOST_PENDING)  # from now on who comes is answered, if a little later
         except OSError:
             made.close()
             raise

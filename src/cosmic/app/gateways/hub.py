@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from threading import Lock
 from typing import Any, Final
 
-from cosmic.app.gateways.catalogue import streams_of
 from cosmic.app.gateways.plain import to_json
 from cosmic.frame.clock import WALL
-from cosmic.frame.declaration import Declared
+from cosmic.frame.declaration import Declared, declaration_of
 from cosmic.frame.network.host import STATE
 from cosmic.frame.network.ongoing import StateMessage
 from cosmic.frame.network.station import LEASE_TOPIC, Station
@@ -57,21 +56,30 @@ class Hub:
     A topic is received while somebody follows it, and encoded once however many do.
     """
 
-    def __init__(self, station: Station, kinds: Mapping[str, type[Declared]]) -> None:
+    def __init__(self, station: Station, served: Mapping[str, Declared]) -> None:
         self._station = station
+        self._served = dict(served)
         self._lock = Lock()
-        self._rules: dict[tuple[str, str], Rule] = {}
-        for name, kind in kinds.items():
-            for each in streams_of(name, kind):
-                self._rules[name, each.declared.topic] = each.declared.rule
         self._topics: dict[str, _Topic] = {}
 
     def rule_of(self, topic: str) -> Rule | None:
         """Return how a topic is followed; None where there is none of that name."""
-        parts = topic.split("/")
-        if topic == LEASE_TOPIC or (len(parts) == 2 and parts[1] == STATE):
+        if topic == LEASE_TOPIC:
             return Rule.LATEST
-        return self._rules.get((parts[0], parts[-1])) if len(parts) > 1 else None
+        application, *steps = topic.split("/")
+        place: Any = self._served.get(application)
+        if place is not None and steps == [STATE]:
+            return Rule.LATEST
+        # Down to an object that is there: each topic that is followed has a thread of its own.
+        while place is not None and len(steps) > 1:
+            found = declaration_of(type(place)).parts.get(steps.pop(0))
+            place = None if found is None else getattr(place, found.name)
+            if found is not None and found.keyed:
+                place = (place or {}).get(steps.pop(0))
+        if place is None or len(steps) != 1:
+            return None
+        streams = declaration_of(type(place)).streams.values()
+        return next((each.rule for each in streams if each.topic == steps[0]), None)
 
     def follow(self, topic: str, follower: Follower, encode: Encode | None = None) -> "Unfollow":
         """Have `follower` called with what is published to a topic, the newest at once.

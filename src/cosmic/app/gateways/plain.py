@@ -158,14 +158,23 @@ def _one_of(value: object, kinds: tuple[Any, ...]) -> object:
             there = ", ".join(_said(each) for each in kinds)
             raise CallRefused(f"{KIND} {_short(value[KIND])} is none of {there}")
         return from_json(value, named[0])
-    tried = []
+    tried, fits = [], []
     for each in sorted(kinds, key=lambda each: each is float):  # an int stays one if it may
         if get_origin(each) is Callable:
             continue
         try:
-            return from_json(value, each)
+            made = from_json(value, each)
         except CallRefused as exc:
             tried.append(str(exc))
+            continue
+        if not isinstance(value, dict) or not isinstance(each, type):
+            return made
+        fits.append((each, made))
+    if len(fits) == 1:
+        return fits[0][1]
+    if fits:  # what needs no fields would be meant by an empty object
+        there = ", ".join(_said(each) for each, _ in fits)
+        raise CallRefused(f"say by {KIND!r} what is meant: one of {there}")
     raise CallRefused(f"{_short(value)} is nothing that fits ({'; '.join(tried)[:300]})")
 
 

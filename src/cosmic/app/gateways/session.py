@@ -4,7 +4,7 @@ import logging
 import secrets
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from threading import Lock
 from typing import Any, Final
@@ -32,6 +32,7 @@ class Order:
     application: str
     found: Offered
     arguments: Mapping[str, object]
+    caller: Caller
 
     @property
     def title(self) -> str:
@@ -166,6 +167,8 @@ class GatewaySession:
         function: str,
         arguments: Mapping[str, object],
         keys: tuple[str, ...] = (),
+        *,
+        door: str = "",
     ) -> Order:
         """Return a command, its arguments made of JSON; a later halt makes it void.
 
@@ -173,13 +176,16 @@ class GatewaySession:
         ----------
         keys : tuple of str
             Of the parts with keys on the way to the command.
+        door : str
+            How it came, such as "mcp"; by default, the gateway's own.
 
         Raises
         ------
         CallRefused
             There is no such command, it may not be given, or an argument is not of its kind.
         """
-        found = self._station.invoker(application).find(self._caller, function)
+        caller = replace(self._caller, door=door) if door else self._caller
+        found = self._station.invoker(application).find(caller, function)
         known = {name: kind for name, kind in found.parameters.items() if name[0] not in "@#"}
         given: dict[str, object] = {}
         for name, value in arguments.items():
@@ -195,7 +201,7 @@ class GatewaySession:
             given[KEYS] = keys
         if NUMBER in found.parameters:
             given[NUMBER] = next(self._numbers)
-        return Order(application, found, found.checked(given))
+        return Order(application, found, found.checked(given), caller)
 
     def carry_out(self, order: Order) -> object:
         """Carry a command out and return its result; an `Operation` where it goes on.
@@ -216,7 +222,7 @@ class GatewaySession:
 
     def _invoke(self, order: Order) -> object:
         invoker = self._station.invoker(order.application)
-        result = invoker.invoke(self._caller, order.found.name, order.arguments)
+        result = invoker.invoke(order.caller, order.found.name, order.arguments)
         wrapped = self._tickets.wrap(result, moves=order.found.mark.moves)
         answer = wrapped.result if isinstance(wrapped, Answered) else wrapped
         if isinstance(answer, Ticket):

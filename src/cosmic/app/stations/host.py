@@ -90,8 +90,6 @@ class StationHost:
                 self._station.host(name, side)
             facts = _facts(platform, self._applications)
             self._station.host(ITSELF, StationSide(facts, lease))
-            if audit is not None:
-                undo.callback(audit.join(self._station))
             listener = ServerListener(self._station, _opened(how), how.allowed)
             undo.callback(listener.shut_down)
             listener.start()
@@ -106,6 +104,8 @@ class StationHost:
                 hosts[CAMPAIGNS] = Host(CAMPAIGNS, self._campaigns)
                 undo.callback(hosts[CAMPAIGNS].close)
                 self._station.host(CAMPAIGNS, hosts[CAMPAIGNS])
+            if audit is not None:  # when all is hosted that can be called
+                undo.callback(audit.join(self._station, self._approvals))
             said = {each.name: getattr(facts, each.name) for each in fields(facts)}
             self._gateways = Gateways(
                 self._station, hosts, said, doors or Doors(), self._approvals.ask

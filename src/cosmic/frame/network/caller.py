@@ -41,7 +41,7 @@ class Caller:
     local : bool
         It runs in this process.
     door : str
-        How it comes: "station", "http", "epics".
+        How it comes: "station", "http", "mcp", "epics".
     """
 
     name: str

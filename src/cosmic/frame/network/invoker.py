@@ -85,7 +85,9 @@ class ApplicationInvoker:
         # Everybody may stop, whatever else is forbidden.
         needed = Access.VIEW if mark.reads or mark.at_once else Access.CALL
         if caller.access < (Access.MOVE if mark.moves else needed):
-            raise CallRefused(f"{caller.name} may not call {self._name}.{found.name}")
+            refused = CallRefused(f"{caller.name} may not call {self._name}.{found.name}")
+            self.ended.emit(Ended(caller, found, {}, refused))
+            raise refused
         return found
 
     def invoke(

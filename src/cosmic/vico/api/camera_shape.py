@@ -32,7 +32,9 @@ if TYPE_CHECKING:
     from cosmic.vico.api.coordinate_transform import CoordinateTransform
     from cosmic.vico.api.fibres import PlacedFibre
 
-SUFFIXES: Final = (".tif", ".tiff", ".png")
+ARRAY_SUFFIXES: Final = (".tif", ".tiff")
+"""Images of these are told of as an array; what reads documents takes no PNG, and raises."""
+SUFFIXES: Final = (*ARRAY_SUFFIXES, ".png")
 WAIT_S: Final = 5.0
 StreamAsset = tuple[str, dict[str, Any]]
 """Name and content of a document of bluesky."""
@@ -44,8 +46,8 @@ MEASURES: Final[Mapping[str, str]] = {"length_um": "um", "width_um": "um", "curl
 class CameraShape:
     """Readable, Configurable, Triggerable, Stageable and WritesExternalAssets, without bluesky.
 
-    Images that are kept reach what reads documents, such as tiled, as a stream resource of files.
-    Any thread.
+    Images that are kept as TIFF reach what reads documents, such as tiled, as a stream resource of
+    files; of a PNG its path alone. Any thread.
     """
 
     parent: None = None
@@ -119,7 +121,7 @@ class CameraShape:
         folder : path or None
             Where each image goes, into a file of its own; None keeps none.
         suffix : str
-            ".tif" or ".png".
+            ".tif" or ".png"; images of a PNG are no array in tiled, their paths are there.
         fibres : bool
             Find the fibres on each and measure the longest.
 
@@ -190,7 +192,8 @@ class CameraShape:
         if self._folder is not None:
             path = self._save(image, self._folder)
             values["file"] = str(path)
-            self._assets = (*self._assets, *self._documents(path))
+            if self._suffix in ARRAY_SUFFIXES:
+                self._assets = (*self._assets, *self._documents(path))
         if self._fibres:
             values |= self._measured(image)
         return {
@@ -212,13 +215,12 @@ class CameraShape:
         """Yield what tells of one more file; the first of a run tells of the folder before it."""
         if not self._resource:
             self._resource = str(uuid4())
-            kind = "image/png" if self._suffix == ".png" else "image/tiff"
             yield (
                 "stream_resource",
                 {
                     "uid": self._resource,
                     "data_key": f"{self.name}_image",
-                    "mimetype": f"multipart/related;type={kind}",
+                    "mimetype": "multipart/related;type=image/tiff",
                     "uri": f"{path.parent.as_uri().replace('file:///', 'file://localhost/')}/",
                     "parameters": {
                         "chunk_shape": [1],
@@ -266,7 +268,7 @@ class CameraShape:
     def describe(self) -> DataKeys:
         """Return what `read` returns, in bluesky's terms; it follows `plan_images`.
 
-        Images that are kept are described as well; `collect_asset_docs` tells where they are.
+        Images that are kept as TIFF are described as well; `collect_asset_docs` tells where.
         """
         source = self._source
         keys = {
@@ -276,7 +278,8 @@ class CameraShape:
         }
         if self._folder is not None:
             keys["file"] = text_key(source)
-            keys["image"] = self._image_key()
+            if self._suffix in ARRAY_SUFFIXES:
+                keys["image"] = self._image_key()
         if self._fibres:
             keys["fibres"] = whole_key(source)
             for key, unit in MEASURES.items():
@@ -286,12 +289,12 @@ class CameraShape:
 
     def _image_key(self) -> DataKey:
         shown = self._newest
-        height, width = (0, 0) if shown is None else shown.data.shape[:2]
+        shape = (0, 0) if shown is None else shown.data.shape
         kind = "|u1" if shown is None else shown.data.dtype.str
         return {
             "source": self._source,
             "dtype": "array",
-            "shape": [int(height), int(width)],
+            "shape": [int(each) for each in shape],
             "dtype_numpy": kind,
             "external": "STREAM:",
         }

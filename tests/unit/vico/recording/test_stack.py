@@ -69,6 +69,24 @@ def test_a_stack_says_when_how_long_and_where(tmp_path):
     assert "PositionZ" not in planes[0]
 
 
+def test_a_stack_says_the_interval_of_images_that_come_regularly(tmp_path):
+    recorded(tmp_path / "run.tif")
+    pixels = planes_of(tmp_path / "run.tif")[0]["Pixels"]
+    assert pixels["TimeIncrement"] == pytest.approx(0.05)
+    assert pixels["TimeIncrementUnit"] == "s"
+
+
+@pytest.mark.parametrize("numbers", [(0,), (0, 1, 3), (0, 1, 2, 1), (0, 0)])
+def test_a_stack_of_images_that_come_irregularly_says_no_interval(tmp_path, numbers):
+    file = ImageFile(tmp_path / "run.tif", ImageFormat.STACK, axes=AXES, rate_hz=20.0)
+    for number in numbers:
+        shot = on_a_stage(number)
+        file.append(shot.data, row_of(shot, TAKEN))
+    file.close(complete=True)
+    pixels = planes_of(tmp_path / "run.tif")[0]["Pixels"]
+    assert "TimeIncrement" not in pixels
+
+
 def test_a_stack_is_read_back_with_its_side_file(tmp_path):
     shots = recorded(tmp_path / "run.tif")
     with open_image_recording(tmp_path / "run.tif") as found:

@@ -1,12 +1,15 @@
 """What OME-TIFF says of images: when they were taken, how long exposed, where the stage stood."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final
 
 from cosmic.vico.core.recording.side_row import SideRow
 
 STAGES: Final = ("stage", "sample", "table")
 """Assemblies whose x, y and z are the position of the stage; the first that has one of them."""
+UNEVEN: Final = 0.05
+"""Intervals that differ by more of their mean are not regular: `TimeIncrement` would mislead."""
 
 
 def described(rows: Sequence[SideRow], scale_um_px: float | None) -> dict[str, object]:
@@ -25,8 +28,21 @@ def described(rows: Sequence[SideRow], scale_um_px: float | None) -> dict[str, o
             "PhysicalSizeY": scale_um_px,
             "PhysicalSizeYUnit": "µm",
         }
+    every_s = _interval_s(rows)
+    if every_s is not None:
+        found |= {"TimeIncrement": every_s, "TimeIncrementUnit": "s"}
     found["Plane"] = _planes(rows)
     return found
+
+
+def _interval_s(rows: Sequence[SideRow]) -> float | None:
+    """Return the time from image to image; None where they do not come regularly."""
+    if len(rows) < 2:
+        return None
+    mean_s = (rows[-1].exposed_s - rows[0].exposed_s) / (len(rows) - 1)
+    intervals_s = [after.exposed_s - before.exposed_s for before, after in pairwise(rows)]
+    regular = all(abs(each - mean_s) <= UNEVEN * mean_s for each in intervals_s)
+    return mean_s if mean_s > 0.0 and regular else None
 
 
 def _planes(rows: Sequence[SideRow]) -> dict[str, object]:
