@@ -89,7 +89,8 @@ def follow(
         both = gripper
     off = probe.off_um[0] - both.off_um[0], probe.off_um[1] - both.off_um[1]
     before = known.seen_off_um
-    moved = off[0] - before[0], off[1] - before[1]
+    # A fibre at an edge of the probe is taken for the probe: it says nothing then.
+    moved = (off[0] - before[0], off[1] - before[1]) if probe.certain else (0.0, 0.0)
     if not all(math.hypot(*each) <= settings.drift_far_um for each in (gripper.off_um, moved)):
         mark_unreliable(work)
         return

@@ -441,24 +441,35 @@ def _both(off_um: tuple[float, float]) -> dict[str, float]:
 
 
 def see_both(work: HandlingContext) -> Generator[Yielded, object, tuple[TipOff, TipOff]]:
-    """Return where gripper and probe are seen on one image; raises `NotAvailable`."""
+    """Return where gripper and probe are seen; raises `NotAvailable`.
+
+    Both at one place of the image, one after the other: the zoom comes to rest at another scale
+    each time, which is a few micrometres from the jaws to the probe beside them.
+    """
     yield from beside_jaws(work)
     image = yield work.image()
     assert isinstance(image, CameraImage)
     yield from retract_probe(work)
-    return tip_off(work, image, work.gripper), tip_off(work, image, work.probe)
+    yield work.go(work.at(work.gripper, *_beside_um(work)))
+    there = yield work.image()
+    assert isinstance(there, CameraImage)
+    return tip_off(work, there, work.gripper), tip_off(work, image, work.probe)
+
+
+def _beside_um(work: HandlingContext) -> tuple[float, float]:
+    positions, settings = work.settings.places, work.settings.calibration
+    beside = (positions.hold_x_um + settings.compare_beside_um) * work.jaws.forward
+    return beside, positions.hold_y_um + settings.compare_before_um
 
 
 def beside_jaws(work: HandlingContext) -> Steps:
     """Hold the jaws where fibres are pushed, and the probe beside them: both in one image."""
-    positions, settings = work.settings.places, work.settings.calibration
+    positions, (beside, before) = work.settings.places, _beside_um(work)
     hold_x = positions.hold_x_um * work.jaws.forward
     yield work.rise(positions.travel_um)
     yield work.go(work.at(work.gripper, hold_x, positions.hold_y_um))
     yield work.go_up(work.hold_tip_um)
     guard_probe(work)
-    beside = hold_x + settings.compare_beside_um * work.jaws.forward
-    before = positions.hold_y_um + settings.compare_before_um
     # Aside while it is far back, then straight ahead: nothing is beside its way.
     yield work.go({work.probe.x_axis: beside - work.probe.tip_um[0]})
     yield work.go(work.at(work.probe, beside, before))

@@ -75,6 +75,14 @@ def test_the_probe_is_followed_from_where_a_touch_has_it() -> None:
     assert entry.values["off_y_um"] == pytest.approx(6.5)
 
 
+def test_a_probe_with_a_fibre_at_its_edge_is_not_followed() -> None:
+    work: Any = Work()
+    x, y = work.place_um()
+    follow(work, TipOff((3.0, -1.0), 0.2), TipOff((4.0, -18.0), 0.2, certain=False))
+    assert work.calibration.probe_off_um == (1.0, 2.0)
+    assert work.place_um() == pytest.approx([x - 3.0, y + 1.0])
+
+
 def test_what_may_be_noise_is_left_alone() -> None:
     work = Work()
     before = work.place_um()
