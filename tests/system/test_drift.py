@@ -14,7 +14,7 @@ CONFIG = Path(__file__).resolve().parents[2] / "config"
 WORLD = """
 about = "A zoom that comes to rest at another scale each time, and nothing else."
 [session]
-"optics.views.microscope.zoom_scale" = 0.008
+"optics.views.microscope.zoom_scale" = 0.02
 """
 RECIPE = """
 procedure = "bend test"
