@@ -18,6 +18,9 @@ from oracles.bent_fibre import Rig, curve
 DRY = 5e-11
 DRAWS = 24
 
+RIGID = {"shear_part": 0.0, "shear_std_part": 0.0}
+"""Fibres of the rig bend and do not shear."""
+
 
 def pushed(rig: Rig) -> list[Span]:
     """Return the spans that a procedure would measure."""
@@ -85,7 +88,7 @@ def test_the_clamp_is_found_behind_the_tip_of_the_jaws() -> None:
 def test_the_slope_does_not_care_about_an_offset_of_the_nominal_places() -> None:
     spans = pushed(rig())
     moved = [dataclasses.replace(span, nominal_um=span.nominal_um + 6.0) for span in spans]
-    one, other = fit_bending(spans), fit_bending(moved)
+    one, other = (fit_bending(each, settings=FitSettings(**RIGID)) for each in (spans, moved))
     assert other.ei_n_m2 == pytest.approx(one.ei_n_m2, rel=0.02)
     assert other.clamp_offset_um == pytest.approx(one.clamp_offset_um - 6.0, abs=4.5)
 
@@ -140,7 +143,7 @@ def test_what_is_known_of_the_offset_beforehand_counts_by_its_certainty() -> Non
 
 def test_one_span_is_as_uncertain_as_its_position_and_the_clamp_together() -> None:
     span = rig().push(300.0, 12.0)
-    alone = {"offset_std_um": 6.0, "shear_part": 0.0, "shear_std_part": 0.0}
+    alone = {"offset_std_um": 6.0, **RIGID}
     widths = [
         width_percent(fit_bending([span], settings=FitSettings(**alone, **more)))
         for more in ({"contact_std_um": 0.1}, {"contact_std_um": 6.0})
