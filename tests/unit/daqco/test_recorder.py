@@ -56,7 +56,10 @@ def test_the_only_chunk_of_a_recording_has_positions(tmp_path: Path, begins: str
         before_change=lambda _check: None,
     )
     recorder = Recorder(acquisition, FailurePolicy())  # type: ignore[arg-type]
-    recorder.position_source = lambda: [AxisPosition(WALL.now_s(), "probe.y", 5.0, "um", "known")]
+    where_um = [5.0]
+    recorder.position_source = lambda: [
+        AxisPosition(WALL.now_s(), "probe.y", where_um[0], "um", "known")
+    ]
     recorder._handing_over = lock = StartsFirst()  # type: ignore[assignment]
     given = chunks(HEAD, volts_of(2, 30))
     came.emit(next(given))  # positions are not due again for a while
@@ -66,8 +69,9 @@ def test_the_only_chunk_of_a_recording_has_positions(tmp_path: Path, begins: str
     else:
         lock.begin = lambda: recorder.start(path)
     came.emit(next(given))
+    where_um[0] = 6.0  # and no chunk comes any more
     recorder.stop()
     with open_recording(path) as recording:
         times_s, where, _ = recording.positions("probe.y")
-        assert len(times_s) == 1
-        np.testing.assert_array_equal(where, [5.0])
+        assert times_s[0] <= times_s[1]
+        np.testing.assert_array_equal(where, [5.0, 6.0])

@@ -263,6 +263,8 @@ class Recorder:
             self._writer = None
             if writer is None:
                 return
+            if self.position_source is not None:  # where all came to, however short it was
+                writer.add_positions(tuple(self.position_source()))
             writer.request_end()
             if not writer.join():
                 # Kept, for a thread that is forgotten while it runs ends the program.
