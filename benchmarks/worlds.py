@@ -223,7 +223,7 @@ def measured(session: Session, fibre: Fibre, settings: FitSettings) -> list[Span
     """Return the spans that a procedure would measure, planned as it goes."""
     spans: list[Span] = []
     free, guess = gentle_um(fibre), 5e-11
-    while plan := plan_spans(free, guess, LIMITS, done=spans):
+    while plan := plan_spans(free, guess, LIMITS, done=spans, settings=settings):
         one = [(plan[0].span_um, plan[0].stroke_um)]
         push = pushes(session, fibre, one, first=len(spans))[0]
         spans.append(span_of(push, fibre))

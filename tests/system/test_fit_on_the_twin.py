@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cosmic.autonomy.bending.fit import MeasuredFibre, fit_campaign, measure_fibre
-from cosmic.autonomy.bending.plan import SpanLimits, guess_ei, plan_spans
+from cosmic.autonomy.bending.plan import guess_ei, plan_spans
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Freed, Span
@@ -89,7 +89,7 @@ def measured(
     fit = FitSettings(fibre_width_um=bench.moment.fibres[0].seen_um, **known)
     spans: list[Span] = []
     guess = FIBRE.ei_n_m2
-    while plan := plan_spans(FREE_UM, guess, SpanLimits(), done=spans):
+    while plan := plan_spans(FREE_UM, guess, done=spans, settings=fit):
         spans.append(pushed(bench, plan[0].span_um, plan[0].stroke_um, rng))
         guess = guess_ei(spans, settings=fit) or guess
     met = [facts for name, facts in heard.events if name == "touched"]

@@ -39,11 +39,7 @@ ALONG: Final = ("friction along, once it let go", "")
 LEAST_STD: Final = 0.004
 """Of ln(k): a model is no better than this."""
 
-COMMON: Final = (
-    *("gain", "gain drift", "friction", "compliance", "contact", "cross-talk", "aside"),
-    "shear",
-)
-GAIN, DRIFT, FRICTION, COMPLIANCE, CONTACT, CROSS, ASIDE, SHEAR = range(len(COMMON))
+GAIN, DRIFT, FRICTION, COMPLIANCE, CONTACT, CROSS, ASIDE, SHEAR = range(len(COMMON_SOURCES))
 
 GLASS_SHEAR: Final = (0.5, 0.1)
 """Of a round beam of glass: `FitSettings.shear_part`, and its standard deviation."""
@@ -70,11 +66,11 @@ class Common:
     Attributes
     ----------
     mean : ndarray, shape (8,), float64
-        In the order of `COMMON`: error of ln(gain), its change from begin to end of the campaign,
-        friction less that about which spans were fitted, compliance of jaws and sensor less the
-        sensor's nominal one (um/uN), place of contact (um), the part of a force along the edge
-        that is read as one across, how much more than foreseen the probe gives way along the
-        fibre, as a part, and how much more than foreseen fibres shear.
+        In the order of `COMMON_SOURCES`: error of ln(gain), its change over the campaign, friction
+        less that about which spans were fitted, compliance of jaws and sensor less the sensor's
+        nominal one (um/uN), place of contact (um), the part of a force along the edge that is read
+        as one across, how much more than foreseen the probe gives way along the fibre, as a part,
+        and how much more than foreseen fibres shear.
     covariance : ndarray, shape (8, 8), float64
     """
 
@@ -109,6 +105,10 @@ def common_prior(settings: FitSettings, *, friction: float | None = None) -> Com
     return Common(mean, np.diag(np.maximum(stds, 1e-9) ** 2))
 
 
+_Own = tuple[str, str, Floats, float, float]
+"""What is a fibre's own: name, unit, derivatives of ln(k), mean and standard deviation."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Readings:
     """Stiffnesses of one fibre, both ways of each span in one row after the other.
@@ -124,8 +124,7 @@ class Readings:
     to_common : ndarray, shape (m, 8), float64
         Derivatives to what is common.
     own : tuple of (str, str, ndarray, float, float)
-        What is each fibre's own beside clamp and variation: name, unit, derivatives, mean and
-        standard deviation.
+        What is each fibre's own beside clamp and variation; see `_Own`.
     repeat : ndarray, shape (m, m), float64
         Covariance by places of contact that do not repeat.
     askew : ndarray, shape (m, m), float64
@@ -136,7 +135,7 @@ class Readings:
     noise: Floats
     span: np.ndarray
     to_common: Floats
-    own: tuple[tuple[str, str, Floats, float, float], ...]
+    own: tuple[_Own, ...]
     repeat: Floats
     askew: Floats
     response: Response
@@ -171,31 +170,26 @@ def readings_of(
     sign = np.array([each.sign for each in rows])
     friction = np.array([fits[n].by_friction for n in span]) * sign
     contact = response.by_contact[span]
-    foreseen = settings.shear_part if certified is None else GLASS_SHEAR[0]
-    sheared = settings.fibre_width_um**2 * response.by_square[span]
-    by_shear = -sheared / (1.0 + foreseen * sheared)
+    glass = certified is not None
+    softer, by_shear, shear = _sheared(response.by_square[span], settings, glass=glass)
     to_common = _to_common(fits, rows, friction, response, by_shear, part)
-    if certified is not None:
+    if glass:
         # Glass rubs and shears otherwise than fibres do.
         to_common[:, [FRICTION, SHEAR]] = 0.0
     same = span[:, None] == span[None, :]
-    own = _own(response, span, settings, direction)
-    freed = None if certified is not None else _freed(fits, rows, settings)
-    if certified is not None:
-        glass = ("shear", "", by_shear, 0.0, GLASS_SHEAR[1])
-        own = (*own[1:], ("friction", "", friction, 0.0, settings.friction_std), glass)
-    else:
-        differs = settings.shear_own_part * settings.shear_part
-        own = (*own, ("shear of this fibre alone", "", by_shear, 0.0, differs))
+    own = (*_own(response, span, settings, direction), shear)
+    freed = None if glass else _freed(fits, rows, settings)
+    if glass:
+        own = (*own[1:], ("friction", "", friction, 0.0, settings.friction_std))
     if freed is not None:
         shift, askew = freed
         # The friction along the fibre may have let go as well.
         own = (*own, (*ALONG, np.where(sign > 0.0, friction, 0.0), 0.0, 0.5 * settings.friction))
     else:
         shift = -_between_branches(span, np.log(k))
-        askew = np.zeros_like(same, dtype=float) if certified else _askew(sign, same, settings)
+        askew = np.zeros_like(same, dtype=float) if glass else _askew(sign, same, settings)
     return Readings(
-        log_k=np.log(k) + shift + np.log1p(foreseen * sheared),
+        log_k=np.log(k) + shift + softer,
         noise=_noise(fits, rows, settings),
         span=span,
         to_common=to_common,
@@ -206,6 +200,19 @@ def readings_of(
         longest=_longest(response),
         certified=certified,
     )
+
+
+def _sheared(
+    by_square: Floats, settings: FitSettings, *, glass: bool
+) -> tuple[Floats, Floats, "_Own"]:
+    """Return what is to be added to ln(k), its derivative, and how each fibre differs in it."""
+    part, std, name = settings.shear_part, settings.shear_own_part, "shear of this fibre alone"
+    std *= part
+    if glass:
+        (part, std), name = GLASS_SHEAR, "shear"
+    sheared = settings.fibre_width_um**2 * by_square
+    slope = np.asarray(-sheared / (1.0 + part * sheared))
+    return np.asarray(np.log1p(part * sheared)), slope, (name, "", slope, 0.0, std)
 
 
 def _to_common(
@@ -319,7 +326,7 @@ def _own(
     span: np.ndarray,
     settings: FitSettings,
     direction: tuple[float, float] | None,
-) -> tuple[tuple[str, str, Floats, float, float], ...]:
+) -> tuple[_Own, ...]:
     """Return what is each fibre's own; see `Readings.own`."""
     turned, turned_std = direction or (0.0, math.radians(settings.direction_std_deg))
     at_um = np.array([each.at_um for each in response.shapes])[span]

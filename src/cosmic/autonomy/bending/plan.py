@@ -47,10 +47,8 @@ class SpanLimits(StrictModel):
         Longest push.
     highest_un, wanted_un : float
         Force that may be reached, and that is enough for a good fit.
-    clamp_um : float
-        How deep in the jaws a fibre is taken to be clamped: a span bends over as much more.
-    strain_percent, half_um : float
-        Strain that the surface of a fibre may reach, and how far that lies from its middle.
+    strain_percent : float
+        Strain that the surface of a fibre may reach.
     """
 
     count: int = Field(5, ge=1, le=10)
@@ -63,9 +61,7 @@ class SpanLimits(StrictModel):
     longest_stroke_um: float = Field(40.0, gt=0.0)
     highest_un: float = Field(80.0, gt=0.0)
     wanted_un: float = Field(3.0, gt=0.0)
-    clamp_um: float = Field(25.0, ge=0.0)
     strain_percent: float = Field(0.5, gt=0.0)
-    half_um: float = Field(15.0, gt=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,18 +89,20 @@ def plan_spans(
     limits: SpanLimits | None = None,
     *,
     done: Sequence[Span] = (),
+    settings: FitSettings | None = None,
 ) -> tuple[PlannedSpan, ...]:
     """Return the pushes to be made, the longest and therefore gentlest first.
 
     Softer fibres get shorter spans. After the first span plan again with a better guess
-    (`guess_ei`) and with what is `done`; what is returned is what remains.
+    (`guess_ei`) and with what is `done`; what is returned is what remains. `settings` has the depth
+    of the clamp, by which a span bends over more, and the fibre's width.
 
     Raises
     ------
     BendingError
         The fibre is too short for the shortest span.
     """
-    limits = limits or SpanLimits()
+    limits, settings = limits or SpanLimits(), settings or FitSettings()
     room_um = min(limits.longest_um, length_free_um - limits.beyond_um)
     if not room_um >= limits.shortest_um:
         raise BendingError(
@@ -118,12 +116,13 @@ def plan_spans(
     enough = math.sqrt(3.0 * ei * limits.stroke_part / limits.wanted_un)
     longest = min(room_um, max(enough, LEAST_SPREAD * limits.shortest_um))
     clear = (3.0 * ei * limits.shortest_stroke_um / limits.highest_un) ** (1.0 / 3.0)
-    clear -= limits.clamp_um
+    clear -= settings.offset_um
     shortest = min(max(limits.shortest_um, limits.shortest_part * longest, clear), longest)
     remaining = limits.count - len(done)
     positions = _spread(shortest, longest, limits.count)
     left = _farthest(positions, [span.nominal_um for span in done], remaining)
-    return tuple(_planned(position, ei, limits) for position in sorted(left, reverse=True))
+    left.sort(reverse=True)
+    return tuple(_planned(position, ei, limits, settings) for position in left)
 
 
 def guess_ei(spans: Sequence[Span], *, settings: FitSettings | None = None) -> float | None:
@@ -178,13 +177,15 @@ def _farthest(positions: list[float], done: list[float], count: int) -> list[flo
     return left[: max(count, 0)]
 
 
-def _planned(span_um: float, ei_un_um2: float, limits: SpanLimits) -> PlannedSpan:
-    lever_um = span_um + limits.clamp_um
+def _planned(
+    span_um: float, ei_un_um2: float, limits: SpanLimits, settings: FitSettings
+) -> PlannedSpan:
+    lever_um, surface_um = span_um + settings.offset_um, max(settings.fibre_width_um, 1.0) / 2.0
     stiffness = 3.0 * ei_un_um2 / lever_um**3
     stroke = min(
         limits.stroke_part * span_um,
         limits.longest_stroke_um,
         limits.highest_un / stiffness,
-        0.01 * limits.strain_percent * lever_um**2 / (3.0 * limits.half_um),
+        0.01 * limits.strain_percent * lever_um**2 / (3.0 * surface_um),
     )
     return PlannedSpan(span_um=span_um, stroke_um=stroke, force_un=stiffness * stroke)

@@ -26,7 +26,7 @@ DRIFT: Final = "drift of the tips"
 
 
 class CheckDrift(FibreOperation):
-    """Gripper and probe are seen on one image again, every so many fibres.
+    """Gripper and probe are seen again, every so many fibres.
 
     What has moved by more than the setting, and by more than can be noise, is followed: maps,
     rotation centre and the probe's position. What has moved far, or is not seen, is measured anew.
@@ -141,6 +141,6 @@ def _note(work: HandlingContext, gripper: TipOff, moved: Off, limit_um: float) -
             now_s,
             registry.session,
             zoom=work.settings.calibration.compare_zoom,
-            how="one image of both tips",
+            how="both tips in one place",
         )
     )

@@ -390,7 +390,7 @@ def clear_image(work: HandlingContext) -> Steps:
 
 
 class ComparePositions(Calibrated):
-    """Where the probe's tip is in the frame of the gripper, on one image with both."""
+    """Where the probe's tip is in the frame of the gripper, seen in one place of the image."""
 
     name = "see probe and gripper"
     key = PROBE
@@ -411,7 +411,14 @@ class ComparePositions(Calibrated):
         gripper, probe = yield from see_both(work)
         off = probe.off_um[0] - gripper.off_um[0], probe.off_um[1] - gripper.off_um[1]
         work.calibration.probe_off_um = work.calibration.seen_off_um = off
-        self.kept(work, residual, "px", settings.residual_px, values=_both(off), how="one image")
+        self.kept(
+            work,
+            residual,
+            "px",
+            settings.residual_px,
+            values=_both(off),
+            how="both tips in one place",
+        )
 
     @override
     def check(self, work: HandlingContext, entry: CalibrationEntry) -> Holds:

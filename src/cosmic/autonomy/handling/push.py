@@ -17,6 +17,7 @@ from cosmic.autonomy.bending.fit import (
 )
 from cosmic.autonomy.bending.plan import DRY_EI_N_M2, PlannedSpan, SpanLimits, guess_ei, plan_spans
 from cosmic.autonomy.bending.result import BendingError
+from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Freed, Span
 from cosmic.autonomy.handling.careful_move import CarefulMove
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
@@ -504,7 +505,7 @@ class PushSpans(FibreOperation):
         gentle = shape_of(work, fibre).gentle_um(work.settings.push.steepest_deg)
         fibre.free_um = min(fibre.free_um, gentle)
         try:
-            plan_spans(fibre.free_um, limits=span_limits(work))
+            plan_spans(fibre.free_um, limits=span_limits(work), settings=fit_settings(work, fibre))
         except BendingError as exc:
             raise OperationFailed(TOO_SHORT, str(exc)) from exc
         yield from ready_force(work)
@@ -523,16 +524,15 @@ class PushSpans(FibreOperation):
 
     @staticmethod
     def _spans(work: HandlingContext, fibre: HeldFibre) -> Steps:
-        push = work.settings.push
+        limits, fit = span_limits(work), fit_settings(work, fibre)
         while True:
             guess = fibre.ei_guess_n_m2 or DRY_EI_N_M2
-            plan = plan_spans(fibre.free_um, guess, span_limits(work), done=fibre.spans)
+            plan = plan_spans(fibre.free_um, guess, limits, done=fibre.spans, settings=fit)
             if not plan:
                 break
             yield from OneSpan(work, fibre, plan[0]).steps()
-            width = push.fit.model_copy(update={"fibre_width_um": fibre.width_um})
             if len(fibre.spans) <= GUESSED_FROM:
-                guessed = guess_ei(fibre.spans, settings=width)
+                guessed = guess_ei(fibre.spans, settings=fit)
                 fibre.ei_guess_n_m2 = guessed or fibre.ei_guess_n_m2
             yield SAFE_POINT
 
@@ -546,6 +546,12 @@ def span_limits(work: HandlingContext) -> SpanLimits:
     return push.spans.model_copy(update={"longest_um": longest})
 
 
+def fit_settings(work: HandlingContext, fibre: HeldFibre) -> FitSettings:
+    """Return the instrument as the fit sees it, and how wide the fibre is."""
+    width_um = work.settings.standard.width_um if fibre.standard else fibre.width_um
+    return work.settings.push.fit.model_copy(update={"fibre_width_um": width_um})
+
+
 LEARNED_FROM: Final = 20
 """Fibres before, from which what is common to all is learned."""
 
@@ -557,10 +563,8 @@ class FitSpans(FibreOperation):
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
-        fibre = work.held_fibre()
-        standard = work.settings.standard
-        width_um = standard.width_um if fibre.standard else fibre.width_um
-        fit = work.settings.push.fit.model_copy(update={"fibre_width_um": width_um})
+        fibre, standard = work.held_fibre(), work.settings.standard
+        fit = fit_settings(work, fibre)
         fibre.measured = measure_fibre(
             fibre.spans,
             settings=fit,

@@ -21,6 +21,7 @@ from cosmic.autonomy.handling.plate import along
 from cosmic.autonomy.handling.prepare import retract_probe, zoom_to
 from cosmic.autonomy.handling.push import (
     OneSpan,
+    fit_settings,
     ready_force,
     span_limits,
 )
@@ -218,8 +219,7 @@ class _PushTo(OneSpan):
     def result(self, work: HandlingContext, fibre: HeldFibre) -> PushedTo:
         """Return what it has shown; the span it left with the fibre is taken back."""
         span: Span = fibre.spans.pop()
-        settings = work.settings.push.fit.model_copy(update={"fibre_width_um": fibre.width_um})
-        measured = measure_fibre([span], settings=settings)
+        measured = measure_fibre([span], settings=fit_settings(work, fibre))
         force, std, bend = self._top
         return PushedTo(force, std, bend, span.nominal_um, measured.spans[0])
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from cosmic.autonomy.bending.plan import PlannedSpan, SpanLimits, guess_ei, plan_spans
 from cosmic.autonomy.bending.result import BendingError
+from cosmic.autonomy.bending.settings import FitSettings
 from oracles.bent_fibre import Rig
 
 
@@ -20,13 +21,16 @@ def test_no_span_goes_beyond_its_limits(
     length: float, ei: float, count: int, highest: float
 ) -> None:
     limits = SpanLimits(count=count, highest_un=highest)
-    plan = plan_spans(length, ei, limits)
+    fit = FitSettings(fibre_width_um=40.0)
+    plan = plan_spans(length, ei, limits, settings=fit)
     assert len(plan) == count
     for each in plan:
         assert limits.shortest_um <= each.span_um <= limits.longest_um
         assert each.span_um <= length - limits.beyond_um
         assert 0.0 < each.stroke_um <= limits.stroke_part * each.span_um
         assert each.force_un <= highest * (1.0 + 1e-9)
+        strain = 3.0 * each.stroke_um * 20.0 / (each.span_um + fit.offset_um) ** 2
+        assert strain <= 0.01 * limits.strain_percent * (1.0 + 1e-9), "at the surface"
 
 
 def longest(plan: tuple[PlannedSpan, ...]) -> float:

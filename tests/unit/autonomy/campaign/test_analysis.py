@@ -181,6 +181,14 @@ def test_defaults_of_then_count_and_not_those_of_today(campaign: Path, tmp_path:
     assert settings_in(RECIPE).fit.friction != 0.31
 
 
+def test_what_older_records_say_of_shear_is_taken_over() -> None:
+    text = (
+        "[parameters.push.fit]\nshear_um2 = 500.0\nshear_std_um2 = 100.0\nfibre_width_um = 20.0\n"
+    )
+    fit = settings_in(text).fit
+    assert (fit.shear_part, fit.shear_std_part) == (1.25, 0.25)
+
+
 def test_a_fibre_that_is_not_trusted_in_the_end_is_no_good_one(tmp_path: Path) -> None:
     with CampaignStore.create(tmp_path, INFO) as store:
         number = store.begin_fibre(time_s=0.0)
