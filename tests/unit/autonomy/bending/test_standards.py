@@ -30,9 +30,12 @@ WORLD = World(
 
 
 def measured(
-    session: Session, beam: Fibre, certificate: Certificate | None = None
+    session: Session,
+    beam: Fibre,
+    certificate: Certificate | None = None,
+    settings: FitSettings = SETTINGS,
 ) -> MeasuredFibre:
-    return measure_fibre(spans_of(session, beam), settings=SETTINGS, certificate=certificate)
+    return measure_fibre(spans_of(session, beam), settings=settings, certificate=certificate)
 
 
 def scale_of(*gains: float, certificate: Certificate = CERTIFICATE, seed: int = 5) -> ForceScale:
@@ -53,6 +56,18 @@ def test_a_wrong_gain_is_found_with_its_uncertainty(gain: float) -> None:
     assert scale.off_part == pytest.approx(gain - 1.0, abs=2.2 * scale.off_std_part)
     assert 0.008 < scale.off_std_part < 0.025
     assert [each.refused for each in scale.standards] == ["", "", ""]
+
+
+def test_a_thick_standard_shears_as_glass_does() -> None:
+    session = Session(WORLD, np.random.default_rng(5))
+    thick_um, glass = 80.0, 1.7
+    beam = dataclasses.replace(Fibre.standard(session), thickness_um=thick_um, shear=glass)
+    settings = FitSettings(fibre_width_um=thick_um)
+    standards = [measured(session, beam, CERTIFICATE, settings) for _ in range(3)]
+    scale = assess_campaign([], standards=standards, settings=settings).scale
+    assert scale.verified
+    assert scale.off_part == pytest.approx(session.gain - 1.0, abs=0.008)
+    assert scale.off_std_part < 0.025
 
 
 def test_a_gain_far_from_the_sensors_certificate_is_believed_and_said_aloud() -> None:
