@@ -86,6 +86,19 @@ def test_what_others_say_of_clamp_and_friction_makes_an_interval_narrower() -> N
         assert found.ei_low_n_m2 < fibre.true_ei(600.0) * SCALE < found.ei_high_n_m2
 
 
+def test_how_differently_fibres_shear_makes_the_interval_of_a_wide_one_wider() -> None:
+    session = Session(WORLD, np.random.default_rng(5))
+    fibre = dataclasses.replace(Fibre.drawn(session), thickness_um=40.0)
+    spans, widths = spans_of(session, fibre), []
+    for part in (0.0, 0.4, 0.8):
+        settings = FitSettings(fibre_width_um=40.0, shear_own_part=part)
+        (found,) = fit_campaign([measure_fibre(spans, settings=settings)], settings=settings)
+        (line,) = (each for each in found.budget if each.source == "shear of this fibre alone")
+        assert line.std == pytest.approx(part * settings.shear_part)
+        widths.append(half_width_percent(found))
+    assert widths == sorted(set(widths))
+
+
 def test_the_budget_is_whole_and_says_which_way_each_line_is_known() -> None:
     session = Session(WORLD, np.random.default_rng(2))
     found = fit_bending(spans_of(session, Fibre.drawn(session)))

@@ -253,6 +253,19 @@ def test_the_standard_is_round_and_is_not_slid():
     assert bench.heights_um == []
 
 
+def test_the_standard_is_bent_as_its_own_diameter_bears_and_not_as_wide_as_it_looks():
+    strokes = []
+    for width_um in (10.0, 80.0):
+        bench = Bench(5e-11)
+        beam = bench.settings.standard.model_copy(update={"width_um": width_um})
+        bench.settings = bench.settings.model_copy(update={"standard": beam})
+        bench.held_fibre().standard = True
+        carried_out(PushSpans().run(bench))
+        shortest = bench.held_fibre().spans[-1]
+        strokes.append(float(np.ptp(shortest.probe_um[shortest.force_un > ZERO_UN + 3.0])))
+    assert strokes[1] < 0.6 * strokes[0]
+
+
 def test_a_fibre_nearer_than_foreseen_is_come_up_to_again_from_further_back():
     bench = Bench(5e-11, off_um=60.0)
     carried_out(PushSpans().run(bench))
