@@ -13,11 +13,12 @@ import cosmic
 from contract.cabinet import Cabinet
 from contract.station_rig import free_port, wait_until
 from contract.test_gateway_epics import Client
-from cosmic.app.audit import PlatformAudit
+from cosmic.app.audit import PlatformAudit, audit_file
 from cosmic.app.cli import main
 from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.session import GatewaySession
 from cosmic.app.platform import build_platform
+from cosmic.frame.audit import read_entries
 from cosmic.frame.errors import MoveRefused
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.errors import CallRefused
@@ -56,6 +57,19 @@ def trail(tmp_path: Path) -> Path:
     finally:
         platform.shut_down()
     return path
+
+
+def test_what_a_script_commands_on_its_own_platform_stands_in_the_trail() -> None:
+    with cosmic.connect(applications=("mico",), rate=20) as rig:
+        rig.mico["left.x"].move_to(2.0)
+        with pytest.raises(cosmic.MoveRefused):
+            rig.mico["left.x"].move_to(1e6)
+        rig.mico.stop("enough")
+    kept = list(read_entries(audit_file()))
+    moves = [(each["who"], each["verdict"]) for each in kept if each["what"] == "move left.x"]
+    assert ("script", "begun") in moves
+    assert any(verdict == "refused" for _, verdict in moves)
+    assert [each["why"] for each in kept if each["what"] == "stop"] == ["enough"]
 
 
 def test_every_command_stands_in_the_trail_and_can_be_found(

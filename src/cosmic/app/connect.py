@@ -2,8 +2,10 @@
 
 import atexit
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
+from cosmic.app.audit import PlatformAudit, audit_file
 from cosmic.app.configuration.platform_file import KNOWN_APPLICATIONS, check_applications
 from cosmic.app.platform import Uses, build_platform
 from cosmic.app.rig import Rig
@@ -27,6 +29,8 @@ def connect(
     certificates: str | Path | None = None,
 ) -> Rig:
     """Start the platform in this process and return it; no window and no event loop needed.
+
+    What is commanded is written to this computer's audit trail, which `cosmic audit` lists.
 
     Parameters
     ----------
@@ -89,7 +93,9 @@ def connect(
         world=world,
         uses=uses,
     )
-    rig = Rig(platform)
+    at_end = ExitStack()
+    at_end.enter_context(PlatformAudit(platform, audit_file()))
+    rig = Rig(platform, at_end=at_end)
     atexit.register(rig.close)
     platform.initialize()
     if platform.failure:

@@ -46,8 +46,10 @@ class Rig:
     released, all threads end.
     """
 
-    def __init__(self, platform: Platform, source: str = "script") -> None:
-        self._platform = platform
+    def __init__(
+        self, platform: Platform, source: str = "script", *, at_end: ExitStack | None = None
+    ) -> None:
+        self._platform, self._at_end = platform, at_end or ExitStack()
         self._mico = mico_of(platform.mico, source) if platform.mico is not None else None
         self._daqco = daqco_of(platform.daqco) if platform.daqco is not None else None
         self._vico = vico_of(platform.vico) if platform.vico is not None else None
@@ -427,6 +429,7 @@ class Rig:
                 run.join()
             if self._control is not None:
                 self._control.close()
+            self._at_end.close()
             self._platform.shut_down()
 
     def __enter__(self) -> Self:

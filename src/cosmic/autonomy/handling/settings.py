@@ -247,7 +247,8 @@ class StandardSettings(StrictModel):
     certificate : str
         Number of the certificate, for the record.
     length_um, width_um : float
-        By the length it is known on the plate; the width makes the rounding that it slides on.
+        By the length it is known on the plate; by the width it slides on the probe, shears and is
+        strained.
     x_um, y_um, within_um : float
         Where its middle lies on a plate that is put on, and how far from there it is looked for.
     at : tuple of str
