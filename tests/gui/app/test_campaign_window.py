@@ -10,6 +10,7 @@ from pytestqt.qtbot import QtBot
 from cosmic.app.panels.campaign.dock import CAMPAIGN
 from cosmic.app.panels.campaign.panel import CampaignPanel
 from cosmic.app.platform import Platform, build_platform
+from cosmic.app.windows.closing import CloseDialog
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.records import Outcome
@@ -72,6 +73,12 @@ def close_and_check(window: OperatorWindow, campaign: Campaign, home: Path) -> l
     """Close the window in the middle of its campaign; returns what its fibres came to."""
     assert not campaign.over, campaign.end_reason
     window.close()
+    assert window.isVisible()
+    question = window.findChild(CloseDialog)
+    assert isinstance(question, CloseDialog)
+    assert "campaign is running" in question.informativeText()
+    question.now.click()
+    assert not window.isVisible()
     assert campaign.over
     assert campaign.end_reason == "the window was closed"
     assert campaign.run is not None

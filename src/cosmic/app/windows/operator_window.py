@@ -19,6 +19,7 @@ from cosmic.app.panels.scene import ScenePanel
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
 from cosmic.app.stations.host import StationHost
+from cosmic.app.windows.closing import Closing, what_is_lost
 from cosmic.app.windows.coaching import coach_rules
 from cosmic.app.windows.hint_bar import HintBar, first_steps
 from cosmic.app.windows.park import Parking
@@ -113,6 +114,7 @@ class OperatorWindow(CosmicServerGui):
         self._mico_gui: MicoWidget | None = None
         self._scene: ScenePanel | None = None
         self._path: PathController | None = None
+        self._closing = Closing(self._what_is_lost, self)
         self._parking: Parking | None = None
         self._bridge = WindowBridge()
         self._stop_shown, self._stops = StopState(reason=None, epoch=0), Relay(self._on_latch)
@@ -484,13 +486,20 @@ class OperatorWindow(CosmicServerGui):
 
     def close_now(self) -> None:
         """Close without a question, as when the system ends the program."""
+        self._closing.skip()
         if self._parking is not None:
             self._parking.skip()
         self.close()
 
+    def _what_is_lost(self) -> tuple[str, ...]:
+        operations = self._tasks.operations if self._tasks is not None else None
+        daqco = self._platform.daqco
+        force = daqco is not None and not daqco_of(daqco).remote
+        return what_is_lost(self._rig, operations, force=force)
+
     @override
     def closeEvent(self, event: QCloseEvent) -> None:
-        if self._parking is not None and self._parking.asks():
+        if self._closing.asks() or (self._parking is not None and self._parking.asks()):
             event.ignore()
             return
         super().closeEvent(event)
