@@ -147,10 +147,19 @@ class OperationCard(QFrame):
         self._run = None
         self._look.stop()
         self.title.set_text(result.title)
-        self.badge.set_state(State.OK if result.good else State.ERROR)
+        self._show_outcome(result)
         self.line.setText(result.text)
         self._show_values(result.values)
         self._fit()
+
+    def _show_outcome(self, result: "OperationResult") -> None:
+        """Show by the badge how it ended; what the operator wanted is no error."""
+        if result.good:
+            self.badge.set_state(State.OK)
+        elif result.interrupted:
+            self.badge.set_state(State.REFUSED, word=result.interrupted.upper())
+        else:
+            self.badge.set_state(State.ERROR)
 
     def show_refused(self, title: str, why: str) -> None:
         """Show that an operation did not begin, and why."""
@@ -190,7 +199,7 @@ class OperationCard(QFrame):
         if run is None or run.state in OVER:
             return
         ending = run.state is RunState.ABORTING
-        self.badge.set_state(State.REFUSED if ending else State.BUSY)
+        self.badge.set_state(State.BUSY)
         view = run.tree
         self.line.setText("ending, and making safe" if ending else at_work(view))
         self.progress.setValue(round(100 * share_done(view)))

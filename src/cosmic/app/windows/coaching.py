@@ -1,7 +1,7 @@
 """What the coach of the operator's window proposes, the most urgent first."""
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Final, Protocol
 
 from cosmic.app.panels.coach import Rule, Step
 from cosmic.app.panels.force import ForcePanel
@@ -16,6 +16,9 @@ from cosmic.mico.core.motion.positioner import Confidence
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.hw.interface import PositionerKind
 from cosmic.vico.hw.peripherals import LensAxis
+
+ZOOMED_IN: Final = 1.05
+"""Beyond so many times the least zoom not all of the plate is seen."""
 
 
 class Parts(Protocol):
@@ -163,16 +166,39 @@ class _Rules:
             return Step(text, request.title, lambda: operations.begin(request))
         if spaces.current != "Handle":
             return None
-        if operations.failed:
-            text = f"{operations.failed} did not succeed; its card says why. Right-click a fibre "
-            return Step(text + "outlined in green to try again.")
-        if operations.worked:
+        if operations.worked and not operations.failed:
             return None
-        view = self._parts.stage.camera
+        return self._choose_fibre(operations)
+
+    def _choose_fibre(self, operations: FibreOperations) -> Step:
+        """Come to a fibre that can be clicked: found, in sight, chosen."""
+        view, failed = self._parts.stage.camera, operations.failed
         if not operations.finding(view):
             text = "To take a fibre, have the fibres found, then right-click one in the image."
             return Step(text, "Find fibres", lambda: operations.find(view, on=True))
+        if failed and self._zoomed_in():
+            text = f"{failed} did not succeed. Zoom out, then right-click a fibre outlined in green."
+            return Step(text, "Zoom out", self._try(self._zoom_out))
+        if failed:
+            text = f"{failed} did not succeed; its card says why. Right-click a fibre "
+            return Step(text + "outlined in green to try again.")
         return Step("Right-click a fibre outlined in green to take it with a gripper.")
+
+    def _least_zoom(self) -> float | None:
+        lens = self._rig.vico.lens
+        if lens is None or lens.problem:
+            return None
+        return next((each.zoom for each in lens.steps), None)
+
+    def _zoomed_in(self) -> bool:
+        lens, least = self._rig.vico.lens, self._least_zoom()
+        zoom = lens.zoom if lens is not None else None
+        return zoom is not None and least is not None and zoom > ZOOMED_IN * least
+
+    def _zoom_out(self) -> None:
+        lens, least = self._rig.vico.lens, self._least_zoom()
+        if lens is not None and least is not None:
+            lens.zoom_to(least)
 
     def task(self) -> Step | None:
         """Propose what the workspace in front is for."""

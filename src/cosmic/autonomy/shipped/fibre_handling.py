@@ -17,7 +17,7 @@ from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.marked import MarkedFibre, approach_to
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.single import CloseGently, PushToForce, is_at_probe
-from cosmic.autonomy.procedures.failures import ProcedureStopped
+from cosmic.autonomy.procedures.failures import STOPPED, ProcedureAborted, ProcedureStopped
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun, RunState
 from cosmic.autonomy.shipped.single import (
@@ -39,6 +39,8 @@ from cosmic.mico.core.motion.positioner import positions_of
 logger = logging.getLogger(__name__)
 
 USUAL_FORCE_UN: Final = 50.0
+ENDED: Final = "ended"
+"""What an operation is called that whoever watched over it has ended."""
 GRIPPERS: Final[tuple[str, ...]] = get_args(HandlingSettings.model_fields["gripper"].annotation)
 
 
@@ -98,12 +100,15 @@ class OperationResult:
         A sentence: what was found, or why it was refused or failed.
     values : tuple of (str, str)
         What was measured: a name, and the value with its 95 % interval and unit.
+    interrupted : str
+        "stopped" by the stop, or "ended" by whoever watched over it; empty where it was neither.
     """
 
     title: str
     good: bool
     text: str
     values: tuple[tuple[str, str], ...] = ()
+    interrupted: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,6 +250,8 @@ class FibreHandling:
             return f"{self._run.name} is running; wait until it has ended, or stop it"
         if other := self._busy():
             return f"{other} is running; end it first"
+        if stopped := self._rig.mico.stop_state.reason:
+            return f"motion is stopped ({stopped}); look at the tools, then press Reset"
         if request.operation is SingleOperation.TAKE:
             return self._why_not_take(request)
         if request.operation is SingleOperation.CLOSE:
@@ -462,9 +469,29 @@ class FibreHandling:
             self._note_done(request.operation)
         else:
             result = OperationResult(
-                request.title, good=False, text=_failed(run), values=_doubtful(work)
+                request.title,
+                good=False,
+                text=self._failed(run),
+                values=_doubtful(work),
+                interrupted=_interrupted(run),
             )
         self._end(result)
+
+    def _failed(self, run: ProcedureRun[HandlingContext]) -> str:
+        """Return why a run failed, what is held all the same, and what to do."""
+        interrupted = _interrupted(run)
+        text = str(run.failure)
+        if interrupted == STOPPED:
+            reason = self._rig.mico.stop_state.reason
+            text = f"Motion was stopped: {reason}." if reason else "Motion was stopped."
+        elif interrupted:
+            text = f"It was {text.removeprefix(f'{run.name}: ')}."
+        if run.not_safe and interrupted != STOPPED:
+            text = f"{text.removesuffix('.')}; not made safe: {run.not_safe}"
+        if interrupted and self.held_by:
+            text = f"{text} {self.held_by} still holds the fibre."
+        advice = " Look at the tools, press Reset, then go on."
+        return text + advice if interrupted == STOPPED else text
 
     def _on_replayed(
         self, run: ProcedureRun[HandlingContext], operations: tuple[SingleOperation, ...]
@@ -476,7 +503,12 @@ class FibreHandling:
             text = "Every step was carried out."
             result = OperationResult(f"Replay {run.name}", good=True, text=text)
         else:
-            result = OperationResult(f"Replay {run.name}", good=False, text=_failed(run))
+            result = OperationResult(
+                f"Replay {run.name}",
+                good=False,
+                text=self._failed(run),
+                interrupted=_interrupted(run),
+            )
         self._end(result)
 
     def _end(self, result: OperationResult) -> None:
@@ -536,13 +568,10 @@ def _forget_moves(rig: Applications) -> None:
         application.undo.forget_all()
 
 
-def _failed(run: ProcedureRun[HandlingContext]) -> str:
-    failure = run.failure
-    stopped = isinstance(failure, ProcedureStopped)
-    text = str(failure)
-    if run.not_safe and not stopped:
-        text = f"{text}; not made safe: {run.not_safe}"
-    return text
+def _interrupted(run: ProcedureRun[HandlingContext]) -> str:
+    if isinstance(run.failure, ProcedureStopped):
+        return STOPPED
+    return ENDED if isinstance(run.failure, ProcedureAborted) else ""
 
 
 def _found(
