@@ -36,9 +36,7 @@ def recording(make: Make, qtbot: QtBot, tmp_path: Path) -> OperatorWindow:
     return window
 
 
-def test_closing_asks_while_a_recording_is_written(
-    recording: OperatorWindow, qtbot: QtBot
-) -> None:
+def test_closing_asks_while_a_recording_is_written(recording: OperatorWindow, qtbot: QtBot) -> None:
     recording.close()
     dialog = question(recording)
     assert dialog is not None

@@ -105,8 +105,7 @@ class OperatorWindow(CosmicServerGui):
         stop_key = platform.file.platform.stop_key
         super().__init__(settings, stop_key=stop_key, theme=theme)
         self.setWindowTitle(f"CoSMic: {platform.file.platform.name}")
-        self._platform = platform
-        self._host = host
+        self._platform, self._host = platform, host
         self._rig = Rig(platform, source="console")
         self._mico = None if platform.mico is None else mico_of(platform.mico, "window")
         self._console: ConsolePanel | None = None
