@@ -18,6 +18,7 @@ from cosmic.autonomy.procedures.tree import ENDS, OPERATION, RUNNING_STATES, Nod
 from cosmic.daqco.gui.value_field import ValueField
 from cosmic.frame.gui.build import named, push_button, styled, tight_row
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.key_focus import set_shown
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font
 
@@ -203,15 +204,17 @@ class OperationCard(QFrame):
         view = run.tree
         self.line.setText("ending, and making safe" if ending else at_work(view))
         self.progress.setValue(round(100 * share_done(view)))
+        if ending and self.stop.hasFocus():
+            self.setFocus()
         self.stop.setEnabled(not ending)
 
     def _fit(self) -> None:
         running = self._run is not None
-        self.progress.setVisible(running)
-        self.stop.setVisible(running)
-        self.close_button.setVisible(not running)
+        set_shown(self.progress, self, shown=running)
+        set_shown(self.stop, self, shown=running)
+        set_shown(self.close_button, self, shown=not running)
         for widget, wanted in self._offered.items():
-            widget.setVisible(wanted and not running)
+            set_shown(widget, self, shown=wanted and not running)
         self._foot.setVisible(not running and any(self._offered.values()))
         self.show()
         self.adjustSize()
