@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.campaign.dock import CAMPAIGN
@@ -113,7 +113,10 @@ def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
     qtbot.waitUntil(lambda: panel.board.state.text() == "stopped", timeout=5_000)
     qtbot.waitUntil(panel.procedure.resume.isEnabled, timeout=5_000)
     window.top_bar.reset_requested.emit()
-    qtbot.mouseClick(panel.procedure.resume, Qt.MouseButton.LeftButton)
+    button = coach.findChild(QPushButton, "coachButton")
+    assert isinstance(button, QPushButton)
+    qtbot.waitUntil(lambda: button.isVisible() and button.text() == "Resume", timeout=5_000)
+    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
     again = panel.campaign
     assert again is not None
     assert again is not campaign, panel.procedure.reason.text()

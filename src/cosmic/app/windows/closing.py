@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import QMessageBox, QWidget
 
-from cosmic.app.rig import Rig
+from cosmic.app.rig import A_CAMPAIGN, Rig
 from cosmic.app.windows.fibre_menu import FibreOperations
 from cosmic.frame.errors import CosmicError
 
@@ -22,7 +22,8 @@ def what_is_lost(rig: Rig, operations: FibreOperations | None, *, force: bool) -
     """
     found: list[str] = []
     if running := rig.running:
-        found.append(f"{running[:1].upper()}{running[1:]} is running: it is aborted.")
+        later = " Resume goes on with it another time." if running == A_CAMPAIGN else ""
+        found.append(f"{running[:1].upper()}{running[1:]} is running: it is aborted.{later}")
     held_by = operations.handling.held_by if operations is not None and operations.used else ""
     if held_by:
         found.append(

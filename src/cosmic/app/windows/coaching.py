@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Final, Protocol
 
+from cosmic.app.panels.campaign.dock import CampaignDock
 from cosmic.app.panels.coach import Rule, Step
 from cosmic.app.panels.force import ForcePanel
 from cosmic.app.panels.tool import ToolPanel
@@ -31,10 +32,14 @@ class Parts(Protocol):
 
 
 def coach_rules(
-    window: CosmicServerGui, rig: Rig, gui: MicoWidget, parts: Parts
+    window: CosmicServerGui,
+    rig: Rig,
+    gui: MicoWidget,
+    parts: Parts,
+    campaign: CampaignDock | None = None,
 ) -> tuple[Rule, ...]:
     """Return the rules of a window: trouble first, then what is missing, then the task in hand."""
-    rules = _Rules(window, rig, gui, parts)
+    rules = _Rules(window, rig, gui, parts, campaign)
     first = (rules.not_ready, rules.stopped, rules.limit_crossed, rules.campaign)
     missing = (
         rules.position_unknown,
@@ -49,8 +54,16 @@ def coach_rules(
 class _Rules:
     """Each looks at one thing and returns what to do about it, or None."""
 
-    def __init__(self, window: CosmicServerGui, rig: Rig, gui: MicoWidget, parts: Parts) -> None:
+    def __init__(
+        self,
+        window: CosmicServerGui,
+        rig: Rig,
+        gui: MicoWidget,
+        parts: Parts,
+        dock: CampaignDock | None,
+    ) -> None:
         self._window, self._rig, self._gui, self._parts = window, rig, gui, parts
+        self._dock = dock
 
     def _try(self, act: Callable[[], object]) -> Callable[[], None]:
         def attempt() -> None:
@@ -262,4 +275,11 @@ class _Rules:
         )
 
     def _campaign(self) -> Step:
+        dock = self._dock
+        if dock is not None and dock.unfinished:
+            text = "The campaign has ended early. Resume goes on with it; Start begins a new one."
+            return Step(text, "Resume", dock.resume)
+        if dock is not None and dock.finished:
+            text = "The campaign is finished. Look at its report; Start begins a new one."
+            return Step(text, "Report", dock.show_report)
         return Step("Choose a recipe and a folder, then press Start.")

@@ -243,7 +243,9 @@ class OperatorWindow(CosmicServerGui):
             self._instruments,
             settings,
         )
-        self._tasks.add_coach(coach_rules(self, self._rig, self._mico_gui, self._tasks))
+        self._tasks.add_coach(
+            coach_rules(self, self._rig, self._mico_gui, self._tasks, self._campaign)
+        )
         if self._platform.daqco is not None:
             indicator = LimitIndicator(daqco_of(self._platform.daqco), compact=True)
             self.top_bar.add_indicator(indicator)
