@@ -227,6 +227,32 @@ def test_after_an_operation_that_failed_the_coach_zooms_out(make: Make, qtbot: Q
     qtbot.waitUntil(lambda: not coach.isVisible())
 
 
+def test_a_fibre_found_at_a_high_zoom_is_refused_before_anything_is_calibrated(
+    make: Make, qtbot: QtBot
+) -> None:
+    window = with_fibres(make, qtbot)
+    lens = cosmic.Rig(window.platform).vico.lens
+    assert lens is not None
+    hand = Hand(window, qtbot)
+    hand.choose(hand.menu_at((10.0, 10.0))["Find fibres"])
+    lens.zoom_to(2.0)
+    qtbot.waitUntil(lambda: abs((lens.zoom or 0.0) - 2.0) < 0.01, timeout=30_000)
+    coach = coach_button(window)
+    qtbot.waitUntil(lambda: coach.isVisible() and coach.text() == "Zoom out")
+    camera = tasks(window).stage.camera.camera
+
+    def at_zoom() -> bool:
+        seen = camera.analysis
+        counts = seen.image.circumstances.zoom_counts if seen is not None else None
+        return counts is not None and lens.scale.zoom(counts) > 1.9
+
+    qtbot.waitUntil(at_zoom, timeout=15_000)
+    menu = hand.menu_at(fibre_px(window, qtbot))
+    assert not menu["Take with left"].isEnabled()
+    assert "zoom out" in menu["Take with left"].toolTip()
+    qtbot.keyClick(QApplication.activePopupWidget(), Qt.Key.Key_Escape)
+
+
 def test_while_stopped_card_and_menu_say_what_to_do(make: Make, qtbot: QtBot) -> None:
     window = with_fibres(make, qtbot)
     card = take(window, qtbot)

@@ -189,10 +189,9 @@ class _Rules:
         if not operations.finding(view):
             text = "To take a fibre, have the fibres found, then right-click one in the image."
             return Step(text, "Find fibres", lambda: operations.find(view, on=True))
-        if failed and self._zoomed_in():
-            text = (
-                f"{failed} did not succeed. Zoom out, then right-click a fibre outlined in green."
-            )
+        if self._zoomed_in():
+            why = f"{failed} did not succeed." if failed else "Fibres are taken in the whole view."
+            text = f"{why} Zoom out, then right-click a fibre outlined in green."
             return Step(text, "Zoom out", self._try(self._zoom_out))
         if failed:
             text = f"{failed} did not succeed; its card says why. Right-click a fibre "

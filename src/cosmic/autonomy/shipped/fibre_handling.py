@@ -43,6 +43,9 @@ ENDED: Final = "ended"
 """What an operation is called that whoever watched over it has ended."""
 GRIPPERS: Final[tuple[str, ...]] = get_args(HandlingSettings.model_fields["gripper"].annotation)
 
+MORE_ZOOM: Final = 1.05
+"""So far beyond a zoom an image still counts as taken at it."""
+
 
 class SingleOperation(StrEnum):
     """What can be done with a fibre by itself; the value is the word."""
@@ -272,7 +275,35 @@ class FibreHandling:
             return "no fibre is marked; find the fibres, and choose one in the image"
         if self.fibre is not None:
             return f"{self._gripper} holds a fibre; put it away first"
-        return self._why_no_gripper(request)
+        return self._why_no_gripper(request) or self._why_not_at_zoom(request, request.marked)
+
+    def _why_not_at_zoom(self, request: OperationRequest, marked: MarkedFibre) -> str:
+        """Return why a fibre cannot be found again from the zoom of its image, or nothing.
+
+        What is measured before the first fibre is taken does not reach that far.
+        """
+        lens, counts = self._rig.vico.lens, marked.image.circumstances.zoom_counts
+        if lens is None or counts is None or self._measured_at(request.gripper, marked):
+            return ""
+        settings = self._settings
+        zoom = lens.scale.zoom(counts)
+        if zoom <= MORE_ZOOM * max(settings.zoom, settings.calibration.compare_zoom):
+            return ""
+        return (
+            f"fibres are taken at {settings.zoom:g}x, and this one was found at {zoom:.3g}x; zoom "
+            "out, then choose it again"
+        )
+
+    def _measured_at(self, gripper: str, marked: MarkedFibre) -> bool:
+        """Tell whether the image of a fibre can be told as positions already."""
+        work = self._contexts.get(gripper)
+        if work is None:
+            return False
+        try:
+            marked.on_platform(work)
+        except NotAvailable:
+            return False
+        return True
 
     def _why_no_gripper(self, request: OperationRequest) -> str:
         if request.gripper in self.grippers:
