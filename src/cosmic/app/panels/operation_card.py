@@ -39,10 +39,11 @@ def share_done(view: NodeView) -> float:
 
 
 def at_work(view: NodeView) -> str:
-    """Return the operation that is carried out now; empty for none."""
+    """Return the operation that is carried out now, as it is read; empty for none."""
     running = (each.name for each in view.walk() if each.kind == OPERATION)
     states = {each.name: each.state for each in view.walk() if each.kind == OPERATION}
-    return next((name for name in running if states[name] in RUNNING_STATES), "")
+    found = next((name for name in running if states[name] in RUNNING_STATES), "")
+    return f"{found} ".replace(" uN ", " µN ").strip()  # files and logs keep to ASCII
 
 
 class OperationCard(QFrame):
@@ -76,7 +77,8 @@ class OperationCard(QFrame):
         self.title = named(ElidedLabel(), "operationTitle")
         self.line = named(QLabel(), "operationLine")
         self.line.setWordWrap(True)
-        self.line.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.MinimumExpanding)
+        self.line.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.line.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.progress = named(QProgressBar(), "operationProgress")
         self.progress.setRange(0, 100)
         self.progress.setAccessibleName("Progress of the operation")
@@ -217,7 +219,10 @@ class OperationCard(QFrame):
             set_shown(widget, self, shown=wanted and not running)
         self._foot.setVisible(not running and any(self._offered.values()))
         self.show()
-        self.adjustSize()
+        column = self.layout()
+        if column is not None:  # adjustSize would take the height of another width
+            column.activate()
+            self.resize(CARD_PX, column.totalHeightForWidth(CARD_PX))
         self.resized.emit()
 
     # What the operator does
