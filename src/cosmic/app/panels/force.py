@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QMenu,
     QPushButton,
+    QSizePolicy,
     QStackedWidget,
     QToolButton,
     QVBoxLayout,
@@ -39,7 +40,7 @@ from cosmic.daqco.gui.plot.units import display_unit
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.file_names import NameOption
-from cosmic.frame.gui.amounts import duration_text
+from cosmic.frame.gui.amounts import clock_text
 from cosmic.frame.gui.build import named, push_button, styled, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.relay import Relay
@@ -168,6 +169,7 @@ class ForcePanel(QWidget):
         self.note.setPlaceholderText("note")
         self.record = named(push_button("● Record", ""), "recordForce")
         self.record.setCheckable(True)
+        self.record.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.record.clicked.connect(self._on_record)
         self.tare = styled(named(push_button("Tare", "Call the force now zero"), "tare"), "narrow")
         self.tare.clicked.connect(self.take_zero)
@@ -582,7 +584,7 @@ class ForcePanel(QWidget):
         recording = self._daqco.recording
         self._recording = recording.active
         self.record.setChecked(recording.active)
-        text = f"■ Stop {duration_text(recording.duration_s)}" if recording.active else "● Record"
+        text = f"■ Stop {clock_text(recording.duration_s)}" if recording.active else "● Record"
         if self.record.text() != text:
             self.record.setText(text)
         usable = recording.active or self._daqco.running

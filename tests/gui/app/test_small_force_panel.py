@@ -1,4 +1,4 @@
-"""Tare in the force panel: done, or refused with what to do in the room there is."""
+"""The force panel in a small window: what it says has room, and Tare says what to do."""
 
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from cosmic.app.panels import force as force_panel
 from cosmic.app.panels.force import ForcePanel
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.app.windows.tasks import MEASURE
+from cosmic.frame.gui.amounts import clock_text
 from gui.app.windows import Make
 
 LEFT = Qt.MouseButton.LeftButton
@@ -61,3 +62,20 @@ def test_tare_calls_the_force_zero_once_the_limit_is_disarmed(make: Make, qtbot:
     qtbot.mouseClick(force.tare, LEFT)
     qtbot.waitUntil(lambda: "zero moved by" in force.message.text())
     qtbot.waitUntil(lambda: abs(force.force or 9.0) < 2.0)
+
+
+def test_a_long_recording_makes_the_panel_no_wider(make: Make, qtbot: QtBot) -> None:
+    _window, force = measuring(make, qtbot)
+    width_px = force.minimumSizeHint().width()
+    force.record.setText(f"■ Stop {clock_text(36_000.0)}")
+    assert force.minimumSizeHint().width() == width_px
+    text_px = force.record.fontMetrics().horizontalAdvance(force.record.text())
+    assert text_px < force.record.width()
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(12.34, "12.3 s"), (125.0, "2:05"), (3725.0, "1:02:05"), (float("nan"), "?")],
+)
+def test_a_time_in_little_room(seconds: float, text: str) -> None:
+    assert clock_text(seconds) == text
