@@ -287,7 +287,9 @@ class FibreHandling:
             return ""
         settings = self._settings
         zoom = lens.scale.zoom(counts)
-        if zoom <= MORE_ZOOM * max(settings.zoom, settings.calibration.compare_zoom):
+        if zoom is None or zoom <= MORE_ZOOM * max(
+            settings.zoom, settings.calibration.compare_zoom
+        ):
             return ""
         return (
             f"fibres are taken at {settings.zoom:g}x, and this one was found at {zoom:.3g}x; zoom "
