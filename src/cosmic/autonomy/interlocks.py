@@ -15,6 +15,7 @@ from cosmic.frame.clock import WALL, Clock
 from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.motion.stop_latch import StopState
+from cosmic.mico.hw.interface import PositionerKind
 from cosmic.vico.api.application import VicoApplication
 
 _UN: Final = {"nN": 1e-3, "uN": 1.0, "µN": 1.0, "mN": 1e3, "N": 1e6}
@@ -136,16 +137,22 @@ def join_exposures(vico: VicoApplication, daqco: DaqcoApplication) -> None:
 def join_positions(recorder: Recorder, mico: Mico, clock: Clock) -> None:
     """Have the positions of all axes written into every recording, on its clock.
 
-    Positions are gate coordinates, at the moment they were read.
+    Positions are gate coordinates, at the moment they were read. A counted position is never read:
+    its moment is now. No axis goes back in time: what was read before it began to move was true
+    until then.
     """
+    newest_s: dict[str, float] = {}
 
     def positions() -> Iterator[AxisPosition]:
         now_s, now_wall_s = clock.now_s(), WALL.now_s()
         rate = clock.rate or 1.0
         for state in mico.states().values():
-            age_s = max(0.0, now_wall_s - state.read_wall_s) * rate if state.in_motion else 0.0
+            read = state.in_motion and state.kind is not PositionerKind.OPEN_LOOP
+            age_s = max(0.0, now_wall_s - state.read_wall_s) * rate if read else 0.0
+            time_s = max(now_s - age_s, newest_s.get(state.name, -math.inf))
+            newest_s[state.name] = time_s
             yield AxisPosition(
-                time_s=now_s - age_s,
+                time_s=time_s,
                 axis=state.name,
                 position=float("nan") if state.position is None else state.position,
                 unit=state.unit,

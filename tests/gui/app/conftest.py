@@ -65,7 +65,7 @@ def made_windows(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
 
     yield make_window
     for window in made:
-        window.close()
+        window.close_now()
         window.deleteLater()
 
 

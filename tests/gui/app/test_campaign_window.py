@@ -4,12 +4,13 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.campaign.dock import CAMPAIGN
 from cosmic.app.panels.campaign.panel import CampaignPanel
 from cosmic.app.platform import Platform, build_platform
+from cosmic.app.windows.closing import CloseDialog
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.records import Outcome
@@ -72,6 +73,12 @@ def close_and_check(window: OperatorWindow, campaign: Campaign, home: Path) -> l
     """Close the window in the middle of its campaign; returns what its fibres came to."""
     assert not campaign.over, campaign.end_reason
     window.close()
+    assert window.isVisible()
+    question = window.findChild(CloseDialog)
+    assert isinstance(question, CloseDialog)
+    assert "campaign is running" in question.informativeText()
+    question.now.click()
+    assert not window.isVisible()
     assert campaign.over
     assert campaign.end_reason == "the window was closed"
     assert campaign.run is not None
@@ -106,7 +113,10 @@ def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
     qtbot.waitUntil(lambda: panel.board.state.text() == "stopped", timeout=5_000)
     qtbot.waitUntil(panel.procedure.resume.isEnabled, timeout=5_000)
     window.top_bar.reset_requested.emit()
-    qtbot.mouseClick(panel.procedure.resume, Qt.MouseButton.LeftButton)
+    button = coach.findChild(QPushButton, "coachButton")
+    assert isinstance(button, QPushButton)
+    qtbot.waitUntil(lambda: button.isVisible() and button.text() == "Resume", timeout=5_000)
+    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
     again = panel.campaign
     assert again is not None
     assert again is not campaign, panel.procedure.reason.text()

@@ -8,6 +8,7 @@ from PySide6.QtGui import QAction, QContextMenuEvent
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QMenu, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
+import cosmic
 from cosmic.app.panels.operation_card import OperationCard
 from cosmic.app.platform import build_platform
 from cosmic.app.windows.fibre_menu import FibreOperations
@@ -183,6 +184,90 @@ def test_a_gripper_closes_gently_and_says_how_far_it_is_open(make: Make, qtbot: 
     qtbot.waitUntil(lambda: opening.text() == "0 ± 49 µm")
     assert window.platform.mico.collision is not None
     assert window.platform.mico.collision.allowed_contacts == frozenset()
+
+
+def take(window: OperatorWindow, qtbot: QtBot) -> OperationCard:
+    """Have the left gripper begin to take a fibre, and wait until something moves."""
+    hand = Hand(window, qtbot)
+    hand.choose(hand.menu_at((10.0, 10.0))["Find fibres"])
+    hand.choose(hand.menu_at(fibre_px(window, qtbot))["Take with left"])
+    found = operations(window)
+    assert window.platform.mico is not None
+    manager = window.platform.mico.manager
+    qtbot.waitUntil(lambda: any(each.in_motion for each in manager.states().values()))
+    assert found.running
+    return found.card
+
+
+def test_an_operation_that_the_operator_ends_is_no_error(make: Make, qtbot: QtBot) -> None:
+    window = with_fibres(make, qtbot)
+    card = take(window, qtbot)
+    qtbot.mouseClick(card.stop, LEFT)
+    assert card.badge.state is State.BUSY  # nothing was refused: it is being made safe
+    qtbot.waitUntil(lambda: not operations(window).running, timeout=60_000)
+    qtbot.waitUntil(card.close_button.isVisible)
+    assert card.badge.word == "ENDED"
+    assert card.line.text() == "It was ended by the operator."
+
+
+def test_after_an_operation_that_failed_the_coach_zooms_out(make: Make, qtbot: QtBot) -> None:
+    window = with_fibres(make, qtbot)
+    card = take(window, qtbot)
+    qtbot.mouseClick(card.stop, LEFT)
+    qtbot.waitUntil(lambda: not operations(window).running, timeout=60_000)
+    assert window.platform.vico is not None
+    lens = cosmic.Rig(window.platform).vico.lens
+    assert lens is not None
+    lens.zoom_to(5.0)
+    qtbot.waitUntil(lambda: (lens.zoom or 0.0) > 4.9, timeout=30_000)
+    coach = coach_button(window)
+    qtbot.waitUntil(lambda: coach.isVisible() and coach.text() == "Zoom out")
+    qtbot.mouseClick(coach, LEFT)
+    qtbot.waitUntil(lambda: (lens.zoom or 9.0) < 0.6, timeout=30_000)
+    qtbot.waitUntil(lambda: not coach.isVisible())
+
+
+def test_a_fibre_found_at_a_high_zoom_is_refused_before_anything_is_calibrated(
+    make: Make, qtbot: QtBot
+) -> None:
+    window = with_fibres(make, qtbot)
+    lens = cosmic.Rig(window.platform).vico.lens
+    assert lens is not None
+    hand = Hand(window, qtbot)
+    hand.choose(hand.menu_at((10.0, 10.0))["Find fibres"])
+    lens.zoom_to(2.0)
+    qtbot.waitUntil(lambda: abs((lens.zoom or 0.0) - 2.0) < 0.01, timeout=30_000)
+    coach = coach_button(window)
+    qtbot.waitUntil(lambda: coach.isVisible() and coach.text() == "Zoom out")
+    camera = tasks(window).stage.camera.camera
+
+    def at_zoom() -> bool:
+        seen = camera.analysis
+        counts = seen.image.circumstances.zoom_counts if seen is not None else None
+        return counts is not None and lens.scale.zoom(counts) > 1.9
+
+    qtbot.waitUntil(at_zoom, timeout=15_000)
+    menu = hand.menu_at(fibre_px(window, qtbot))
+    assert not menu["Take with left"].isEnabled()
+    assert "zoom out" in menu["Take with left"].toolTip()
+    qtbot.keyClick(QApplication.activePopupWidget(), Qt.Key.Key_Escape)
+
+
+def test_while_stopped_card_and_menu_say_what_to_do(make: Make, qtbot: QtBot) -> None:
+    window = with_fibres(make, qtbot)
+    card = take(window, qtbot)
+    window.stop("STOP button")
+    qtbot.waitUntil(lambda: not operations(window).running, timeout=60_000)
+    qtbot.waitUntil(card.close_button.isVisible)
+    assert card.badge.word == "STOPPED"
+    assert "Motion was stopped: STOP button." in card.line.text()
+    assert "press Reset" in card.line.text()
+    menu = Hand(window, qtbot).menu_at(fibre_px(window, qtbot))
+    assert "press Reset" in menu["Take with left"].toolTip()
+    qtbot.keyClick(QApplication.activePopupWidget(), Qt.Key.Key_Escape)
+    operations(window).push(20.0)
+    assert card.badge.state is State.REFUSED
+    assert "press Reset" in card.line.text()
 
 
 @pytest.mark.slow

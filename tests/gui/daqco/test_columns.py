@@ -1,5 +1,7 @@
 """What is in a column of the image: every spike, whatever the chunks and the zoom."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -156,3 +158,12 @@ def test_a_live_image_paints_new_columns_only(qapp):
     for begin in range(0, 500_000, 250):
         image.put(*live.feed(begin, np.zeros((1, 250))))
     assert image.painted <= 5000 + 2000  # each column, and one under way at each refresh
+
+
+def test_another_look_reaches_columns_that_nothing_was_put_into(qapp):
+    image = raster(1)
+    live = LiveColumns(10.0)
+    image.put(*live.feed(0, np.zeros((1, 1000))))  # a fifth of the width
+    image.set_look(replace(image.look, ground="#ffffff"))
+    corners = {image.image.pixelColor(x, 1).name() for x in range(1, image.width, 7)}
+    assert "#000000" not in corners

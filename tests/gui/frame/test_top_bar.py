@@ -1,13 +1,17 @@
+from collections.abc import Iterator
+
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QPushButton, QToolButton
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QToolButton
 from pytestqt.qtbot import QtBot
 
+from cosmic.frame.gui.chip import Chip, Tone
 from cosmic.frame.gui.clearance_meter import Clearance
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.palette import ThemeName, contrast_ratio
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.stop_button import StopButton
-from cosmic.frame.gui.theme import State
+from cosmic.frame.gui.theme import State, apply_theme
 from cosmic.frame.gui.top_bar import TopBar
 
 LEFT = Qt.MouseButton.LeftButton
@@ -69,6 +73,39 @@ def test_the_whole_latched_bar_is_red(bar: TopBar) -> None:
         colour = image.pixelColor(x, y)
         assert colour.red() > 120
         assert colour.green() < 40
+
+
+@pytest.fixture
+def light_or_dark(qapp: QApplication, request: pytest.FixtureRequest) -> Iterator[None]:
+    """A theme for one test."""
+    name: ThemeName = request.param
+    apply_theme(qapp, name)
+    yield
+    apply_theme(qapp, "dark")
+    qapp.setStyleSheet("")
+
+
+@pytest.mark.parametrize("tone", ["quiet", "warning", "alarm", "real"])
+@pytest.mark.parametrize("light_or_dark", ["light", "dark"], indirect=True)
+@pytest.mark.usefixtures("light_or_dark")
+def test_what_a_chip_says_can_be_read_while_stopped(bar: TopBar, tone: Tone) -> None:
+    chip = Chip("force 2.2/150 ARMED", tone)
+    bar.set_workspaces((("Handle", "Move one tool"),))
+    bar.add_indicator(chip)
+    bar.set_latched("key F12")
+    image = chip.grab().toImage()
+    ground = image.pixelColor(4, image.height() // 2).name()
+    seen = {image.pixelColor(x, y).name() for x in range(image.width()) for y in (10, 12, 14)}
+    assert max(contrast_ratio(each, ground) for each in seen) > 4.5
+
+
+def test_a_narrow_bar_says_stopped_in_whole(bar: TopBar) -> None:
+    bar.set_latched("force above 400 µN")
+    label = next(each for each in bar.findChildren(ElidedLabel) if "STOPPED" in each.text())
+    for words in ("■ STOPPED: force above 400 µN", "■ STOPPED", "STOPPED"):
+        label.resize(label.fontMetrics().horizontalAdvance(words) + 4, label.height())
+        assert label.shown_text == words
+    assert "force above 400 µN" in label.toolTip()
 
 
 def test_missing_collision_model_is_said_loudly(bar: TopBar) -> None:

@@ -248,6 +248,21 @@ def test_a_slope_without_travel_is_refused(tmp_path):
             found.slope("force", "probe.x", low=1000.0)
 
 
+def test_a_position_that_goes_back_in_time_is_left_out(tmp_path):
+    head = header()
+    file = RecordingFile(tmp_path / "run.h5", head)
+    for chunk in chunks(head, volts_of(2, 1000), 50):
+        file.append(chunk)
+    for time_s, position in ((100.0, 1.0), (-321.5, 0.0), (100.2, 2.0), (100.2, 3.0)):
+        file.add_positions([AxisPosition(time_s, "left.gripper", position)])
+    file.close(complete=True)
+    with open_recording(tmp_path / "run.h5") as found:
+        times, positions, confidence = found.positions("left.gripper")
+    assert times.tolist() == [100.0, 100.2, 100.2]
+    assert positions.tolist() == [1.0, 2.0, 3.0]
+    assert confidence.size == 3
+
+
 def test_samples_between_unknown_positions_are_left_out_of_a_curve(tmp_path):
     head = header()
     file = RecordingFile(tmp_path / "run.h5", head)

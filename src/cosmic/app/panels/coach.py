@@ -8,6 +8,7 @@ from PySide6.QtCore import QSettings, Qt, QTimer
 from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from cosmic.frame.gui.build import named, push_button, styled, tight_row
+from cosmic.frame.gui.key_focus import set_shown
 from cosmic.frame.gui.theme import STEP_PX
 
 MOST_LINES: Final = 7
@@ -103,7 +104,7 @@ class Coach(QFrame):
         if self.words.text() != text:
             self.words.setText(text)
             self.words.setToolTip(text)
-        self.button.setVisible(step is not None and bool(step.button))
+        set_shown(self.button, self, shown=step is not None and bool(step.button))
         if step is not None and self.button.text() != step.button:
             self.button.setText(step.button)
             self.button.setToolTip(step.text)

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QMenu,
     QPushButton,
+    QSizePolicy,
     QStackedWidget,
     QToolButton,
     QVBoxLayout,
@@ -39,7 +40,7 @@ from cosmic.daqco.gui.plot.units import display_unit
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.file_names import NameOption
-from cosmic.frame.gui.amounts import duration_text
+from cosmic.frame.gui.amounts import clock_text
 from cosmic.frame.gui.build import named, push_button, styled, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.relay import Relay
@@ -52,6 +53,8 @@ T = TypeVar("T")
 READOUT_MS: Final = 100
 CHART_MS: Final = 40
 OLD_S: Final = 1.0
+REFUSAL_MS: Final = 12_000
+"""So long a refusal is shown."""
 MEAN_S: Final = 0.1
 VALUE_PX: Final = 26
 SPAN_S: Final = 10.0
@@ -113,7 +116,9 @@ class ForcePanel(QWidget):
         self._heard_s: float | None = None
         self._recent: deque[float] = deque(maxlen=max(1, round(MEAN_S * 1000.0)))
         self._recording = False
-        self._error = ""
+        self._said = ""
+        self._refused = QTimer(self, interval=REFUSAL_MS, singleShot=True)
+        self._refused.timeout.connect(self._on_refusal_read)
         self._filter: LowPass | None = None
         self._window = RecentValues()
         self._looks = 0
@@ -164,6 +169,7 @@ class ForcePanel(QWidget):
         self.note.setPlaceholderText("note")
         self.record = named(push_button("● Record", ""), "recordForce")
         self.record.setCheckable(True)
+        self.record.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.record.clicked.connect(self._on_record)
         self.tare = styled(named(push_button("Tare", "Call the force now zero"), "tare"), "narrow")
         self.tare.clicked.connect(self.take_zero)
@@ -487,16 +493,25 @@ class ForcePanel(QWidget):
 
     def take_zero(self) -> None:
         """Call the present force zero, by another scale; refused while the sensor is loaded."""
-        value = self._mean()
-        if value is None or self._age_s():
-            self._say("Tare needs a force that is measured now", refused=True)
+        value, limit = self._mean(), self._limit_in_force()
+        if not self._daqco.running:
+            self._say("start the acquisition first", refused=True)
             return
-        limit = self._limit_in_force()
+        if limit is not None and limit.settings.armed:
+            text = "the armed limit watches this zero: disarm it first, by Limit…"
+            self._say(
+                text, "disarm the limit first: Limit…", "disarm it first: Limit…", refused=True
+            )
+            return
+        if value is None or self._age_s():
+            text = "the newest force is old: wait for the next"
+            self._say(text, "the force is old: wait", refused=True)
+            return
         sides = (limit.settings.low, limit.settings.high) if limit is not None else ()
         least = min((abs(each) for each in sides if each is not None), default=math.inf)
         if abs(value) > TARE_SHARE * least:
             text = f"{value:.0f} is a load, no zero: take the tool off the fibre first"
-            self._say(text, refused=True)
+            self._say(text, f"{value:.0f} is a load: take the tool off", refused=True)
             return
         channel = self._channel
         self._ask(lambda: self._daqco.tare(channel), f"zero moved by {value:.1f}")
@@ -508,9 +523,19 @@ class ForcePanel(QWidget):
 
         self._asking.ask(action, done, slow=slow)
 
-    def _say(self, text: str, *, refused: bool = False) -> None:
-        self._error = text if refused else ""
-        self.message.set_text(f"{state_look(State.REFUSED).glyph} {text}" if refused else text)
+    def _say(self, text: str, *shorter: str, refused: bool = False) -> None:
+        """Show a line, or what of `shorter` has room; after a refusal again what was before."""
+        if refused:
+            glyph = state_look(State.REFUSED).glyph
+            self.message.set_text(*(f"{glyph} {each}" for each in (text, *shorter)))
+            self._refused.start()
+            return
+        self._refused.stop()
+        self._said = text
+        self.message.set_text(text)
+
+    def _on_refusal_read(self) -> None:
+        self._say(self._said)
 
     # Recording
 
@@ -559,7 +584,7 @@ class ForcePanel(QWidget):
         recording = self._daqco.recording
         self._recording = recording.active
         self.record.setChecked(recording.active)
-        text = f"■ Stop {duration_text(recording.duration_s)}" if recording.active else "● Record"
+        text = f"■ Stop {clock_text(recording.duration_s)}" if recording.active else "● Record"
         if self.record.text() != text:
             self.record.setText(text)
         usable = recording.active or self._daqco.running

@@ -18,6 +18,7 @@ from cosmic.autonomy.procedures.tree import ENDS, OPERATION, RUNNING_STATES, Nod
 from cosmic.daqco.gui.value_field import ValueField
 from cosmic.frame.gui.build import named, push_button, styled, tight_row
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.key_focus import set_shown
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font
 
@@ -38,10 +39,11 @@ def share_done(view: NodeView) -> float:
 
 
 def at_work(view: NodeView) -> str:
-    """Return the operation that is carried out now; empty for none."""
+    """Return the operation that is carried out now, as it is read; empty for none."""
     running = (each.name for each in view.walk() if each.kind == OPERATION)
     states = {each.name: each.state for each in view.walk() if each.kind == OPERATION}
-    return next((name for name in running if states[name] in RUNNING_STATES), "")
+    found = next((name for name in running if states[name] in RUNNING_STATES), "")
+    return f"{found} ".replace(" uN ", " µN ").strip()  # files and logs keep to ASCII
 
 
 class OperationCard(QFrame):
@@ -75,7 +77,8 @@ class OperationCard(QFrame):
         self.title = named(ElidedLabel(), "operationTitle")
         self.line = named(QLabel(), "operationLine")
         self.line.setWordWrap(True)
-        self.line.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.MinimumExpanding)
+        self.line.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.line.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.progress = named(QProgressBar(), "operationProgress")
         self.progress.setRange(0, 100)
         self.progress.setAccessibleName("Progress of the operation")
@@ -147,10 +150,19 @@ class OperationCard(QFrame):
         self._run = None
         self._look.stop()
         self.title.set_text(result.title)
-        self.badge.set_state(State.OK if result.good else State.ERROR)
+        self._show_outcome(result)
         self.line.setText(result.text)
         self._show_values(result.values)
         self._fit()
+
+    def _show_outcome(self, result: "OperationResult") -> None:
+        """Show by the badge how it ended; what the operator wanted is no error."""
+        if result.good:
+            self.badge.set_state(State.OK)
+        elif result.interrupted:
+            self.badge.set_state(State.REFUSED, word=result.interrupted.upper())
+        else:
+            self.badge.set_state(State.ERROR)
 
     def show_refused(self, title: str, why: str) -> None:
         """Show that an operation did not begin, and why."""
@@ -190,22 +202,27 @@ class OperationCard(QFrame):
         if run is None or run.state in OVER:
             return
         ending = run.state is RunState.ABORTING
-        self.badge.set_state(State.REFUSED if ending else State.BUSY)
+        self.badge.set_state(State.BUSY)
         view = run.tree
         self.line.setText("ending, and making safe" if ending else at_work(view))
         self.progress.setValue(round(100 * share_done(view)))
+        if ending and self.stop.hasFocus():
+            self.setFocus()
         self.stop.setEnabled(not ending)
 
     def _fit(self) -> None:
         running = self._run is not None
-        self.progress.setVisible(running)
-        self.stop.setVisible(running)
-        self.close_button.setVisible(not running)
+        set_shown(self.progress, self, shown=running)
+        set_shown(self.stop, self, shown=running)
+        set_shown(self.close_button, self, shown=not running)
         for widget, wanted in self._offered.items():
-            widget.setVisible(wanted and not running)
+            set_shown(widget, self, shown=wanted and not running)
         self._foot.setVisible(not running and any(self._offered.values()))
         self.show()
-        self.adjustSize()
+        column = self.layout()
+        if column is not None:  # adjustSize would take the height of another width
+            column.activate()
+            self.resize(CARD_PX, column.totalHeightForWidth(CARD_PX))
         self.resized.emit()
 
     # What the operator does

@@ -1,8 +1,9 @@
 """What the coach of the operator's window proposes, the most urgent first."""
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Final, Protocol
 
+from cosmic.app.panels.campaign.dock import CampaignDock
 from cosmic.app.panels.coach import Rule, Step
 from cosmic.app.panels.force import ForcePanel
 from cosmic.app.panels.tool import ToolPanel
@@ -17,6 +18,9 @@ from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.hw.interface import PositionerKind
 from cosmic.vico.hw.peripherals import LensAxis
 
+ZOOMED_IN: Final = 1.05
+"""Beyond so many times the least zoom not all of the plate is seen."""
+
 
 class Parts(Protocol):
     """What of the workspaces the rules look at."""
@@ -28,10 +32,14 @@ class Parts(Protocol):
 
 
 def coach_rules(
-    window: CosmicServerGui, rig: Rig, gui: MicoWidget, parts: Parts
+    window: CosmicServerGui,
+    rig: Rig,
+    gui: MicoWidget,
+    parts: Parts,
+    campaign: CampaignDock | None = None,
 ) -> tuple[Rule, ...]:
     """Return the rules of a window: trouble first, then what is missing, then the task in hand."""
-    rules = _Rules(window, rig, gui, parts)
+    rules = _Rules(window, rig, gui, parts, campaign)
     first = (rules.not_ready, rules.stopped, rules.limit_crossed, rules.campaign)
     missing = (
         rules.position_unknown,
@@ -46,8 +54,16 @@ def coach_rules(
 class _Rules:
     """Each looks at one thing and returns what to do about it, or None."""
 
-    def __init__(self, window: CosmicServerGui, rig: Rig, gui: MicoWidget, parts: Parts) -> None:
+    def __init__(
+        self,
+        window: CosmicServerGui,
+        rig: Rig,
+        gui: MicoWidget,
+        parts: Parts,
+        dock: CampaignDock | None,
+    ) -> None:
         self._window, self._rig, self._gui, self._parts = window, rig, gui, parts
+        self._dock = dock
 
     def _try(self, act: Callable[[], object]) -> Callable[[], None]:
         def attempt() -> None:
@@ -163,16 +179,40 @@ class _Rules:
             return Step(text, request.title, lambda: operations.begin(request))
         if spaces.current != "Handle":
             return None
-        if operations.failed:
-            text = f"{operations.failed} did not succeed; its card says why. Right-click a fibre "
-            return Step(text + "outlined in green to try again.")
-        if operations.worked:
+        if operations.worked and not operations.failed:
             return None
-        view = self._parts.stage.camera
+        return self._choose_fibre(operations)
+
+    def _choose_fibre(self, operations: FibreOperations) -> Step:
+        """Come to a fibre that can be clicked: found, in sight, chosen."""
+        view, failed = self._parts.stage.camera, operations.failed
         if not operations.finding(view):
             text = "To take a fibre, have the fibres found, then right-click one in the image."
             return Step(text, "Find fibres", lambda: operations.find(view, on=True))
+        if self._zoomed_in():
+            why = f"{failed} did not succeed." if failed else "Fibres are taken in the whole view."
+            text = f"{why} Zoom out, then right-click a fibre outlined in green."
+            return Step(text, "Zoom out", self._try(self._zoom_out))
+        if failed:
+            text = f"{failed} did not succeed; its card says why. Right-click a fibre "
+            return Step(text + "outlined in green to try again.")
         return Step("Right-click a fibre outlined in green to take it with a gripper.")
+
+    def _least_zoom(self) -> float | None:
+        lens = self._rig.vico.lens
+        if lens is None or lens.problem:
+            return None
+        return next((each.zoom for each in lens.steps), None)
+
+    def _zoomed_in(self) -> bool:
+        lens, least = self._rig.vico.lens, self._least_zoom()
+        zoom = lens.zoom if lens is not None else None
+        return zoom is not None and least is not None and zoom > ZOOMED_IN * least
+
+    def _zoom_out(self) -> None:
+        lens, least = self._rig.vico.lens, self._least_zoom()
+        if lens is not None and least is not None:
+            lens.zoom_to(least)
 
     def task(self) -> Step | None:
         """Propose what the workspace in front is for."""
@@ -234,4 +274,11 @@ class _Rules:
         )
 
     def _campaign(self) -> Step:
+        dock = self._dock
+        if dock is not None and dock.unfinished:
+            text = "The campaign has ended early. Resume goes on with it; Start begins a new one."
+            return Step(text, "Resume", dock.resume)
+        if dock is not None and dock.finished:
+            text = "The campaign is finished. Look at its report; Start begins a new one."
+            return Step(text, "Report", dock.show_report)
         return Step("Choose a recipe and a folder, then press Start.")

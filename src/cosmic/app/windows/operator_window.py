@@ -19,6 +19,7 @@ from cosmic.app.panels.scene import ScenePanel
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
 from cosmic.app.stations.host import StationHost
+from cosmic.app.windows.closing import Closing, what_is_lost
 from cosmic.app.windows.coaching import coach_rules
 from cosmic.app.windows.hint_bar import HintBar, first_steps
 from cosmic.app.windows.park import Parking
@@ -104,8 +105,7 @@ class OperatorWindow(CosmicServerGui):
         stop_key = platform.file.platform.stop_key
         super().__init__(settings, stop_key=stop_key, theme=theme)
         self.setWindowTitle(f"CoSMic: {platform.file.platform.name}")
-        self._platform = platform
-        self._host = host
+        self._platform, self._host = platform, host
         self._rig = Rig(platform, source="console")
         self._mico = None if platform.mico is None else mico_of(platform.mico, "window")
         self._console: ConsolePanel | None = None
@@ -113,6 +113,7 @@ class OperatorWindow(CosmicServerGui):
         self._mico_gui: MicoWidget | None = None
         self._scene: ScenePanel | None = None
         self._path: PathController | None = None
+        self._closing = Closing(self._what_is_lost, self)
         self._parking: Parking | None = None
         self._bridge = WindowBridge()
         self._stop_shown, self._stops = StopState(reason=None, epoch=0), Relay(self._on_latch)
@@ -242,7 +243,9 @@ class OperatorWindow(CosmicServerGui):
             self._instruments,
             settings,
         )
-        self._tasks.add_coach(coach_rules(self, self._rig, self._mico_gui, self._tasks))
+        self._tasks.add_coach(
+            coach_rules(self, self._rig, self._mico_gui, self._tasks, self._campaign)
+        )
         if self._platform.daqco is not None:
             indicator = LimitIndicator(daqco_of(self._platform.daqco), compact=True)
             self.top_bar.add_indicator(indicator)
@@ -484,13 +487,20 @@ class OperatorWindow(CosmicServerGui):
 
     def close_now(self) -> None:
         """Close without a question, as when the system ends the program."""
+        self._closing.skip()
         if self._parking is not None:
             self._parking.skip()
         self.close()
 
+    def _what_is_lost(self) -> tuple[str, ...]:
+        operations = self._tasks.operations if self._tasks is not None else None
+        daqco = self._platform.daqco
+        force = daqco is not None and not daqco_of(daqco).remote
+        return what_is_lost(self._rig, operations, force=force)
+
     @override
     def closeEvent(self, event: QCloseEvent) -> None:
-        if self._parking is not None and self._parking.asks():
+        if self._closing.asks() or (self._parking is not None and self._parking.asks()):
             event.ignore()
             return
         super().closeEvent(event)

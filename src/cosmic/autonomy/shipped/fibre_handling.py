@@ -17,7 +17,7 @@ from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.marked import MarkedFibre, approach_to
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.single import CloseGently, PushToForce, is_at_probe
-from cosmic.autonomy.procedures.failures import ProcedureStopped
+from cosmic.autonomy.procedures.failures import STOPPED, ProcedureAborted, ProcedureStopped
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun, RunState
 from cosmic.autonomy.shipped.single import (
@@ -39,7 +39,12 @@ from cosmic.mico.core.motion.positioner import positions_of
 logger = logging.getLogger(__name__)
 
 USUAL_FORCE_UN: Final = 50.0
+ENDED: Final = "ended"
+"""What an operation is called that whoever watched over it has ended."""
 GRIPPERS: Final[tuple[str, ...]] = get_args(HandlingSettings.model_fields["gripper"].annotation)
+
+MORE_ZOOM: Final = 1.05
+"""So far beyond a zoom an image still counts as taken at it."""
 
 
 class SingleOperation(StrEnum):
@@ -98,12 +103,15 @@ class OperationResult:
         A sentence: what was found, or why it was refused or failed.
     values : tuple of (str, str)
         What was measured: a name, and the value with its 95 % interval and unit.
+    interrupted : str
+        "stopped" by the stop, or "ended" by whoever watched over it; empty where it was neither.
     """
 
     title: str
     good: bool
     text: str
     values: tuple[tuple[str, str], ...] = ()
+    interrupted: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,6 +253,8 @@ class FibreHandling:
             return f"{self._run.name} is running; wait until it has ended, or stop it"
         if other := self._busy():
             return f"{other} is running; end it first"
+        if stopped := self._rig.mico.stop_state.reason:
+            return f"motion is stopped ({stopped}); look at the tools, then press Reset"
         if request.operation is SingleOperation.TAKE:
             return self._why_not_take(request)
         if request.operation is SingleOperation.CLOSE:
@@ -265,7 +275,37 @@ class FibreHandling:
             return "no fibre is marked; find the fibres, and choose one in the image"
         if self.fibre is not None:
             return f"{self._gripper} holds a fibre; put it away first"
-        return self._why_no_gripper(request)
+        return self._why_no_gripper(request) or self._why_not_at_zoom(request, request.marked)
+
+    def _why_not_at_zoom(self, request: OperationRequest, marked: MarkedFibre) -> str:
+        """Return why a fibre cannot be found again from the zoom of its image, or nothing.
+
+        What is measured before the first fibre is taken does not reach that far.
+        """
+        lens, counts = self._rig.vico.lens, marked.image.circumstances.zoom_counts
+        if lens is None or counts is None or self._measured_at(request.gripper, marked):
+            return ""
+        settings = self._settings
+        zoom = lens.scale.zoom(counts)
+        if zoom is None or zoom <= MORE_ZOOM * max(
+            settings.zoom, settings.calibration.compare_zoom
+        ):
+            return ""
+        return (
+            f"fibres are taken at {settings.zoom:g}x, and this one was found at {zoom:.3g}x; zoom "
+            "out, then choose it again"
+        )
+
+    def _measured_at(self, gripper: str, marked: MarkedFibre) -> bool:
+        """Tell whether the image of a fibre can be told as positions already."""
+        work = self._contexts.get(gripper)
+        if work is None:
+            return False
+        try:
+            marked.on_platform(work)
+        except NotAvailable:
+            return False
+        return True
 
     def _why_no_gripper(self, request: OperationRequest) -> str:
         if request.gripper in self.grippers:
@@ -462,9 +502,29 @@ class FibreHandling:
             self._note_done(request.operation)
         else:
             result = OperationResult(
-                request.title, good=False, text=_failed(run), values=_doubtful(work)
+                request.title,
+                good=False,
+                text=self._failed(run),
+                values=_doubtful(work),
+                interrupted=_interrupted(run),
             )
         self._end(result)
+
+    def _failed(self, run: ProcedureRun[HandlingContext]) -> str:
+        """Return why a run failed, what is held all the same, and what to do."""
+        interrupted = _interrupted(run)
+        text = str(run.failure)
+        if interrupted == STOPPED:
+            reason = self._rig.mico.stop_state.reason
+            text = f"Motion was stopped: {reason}." if reason else "Motion was stopped."
+        elif interrupted:
+            text = f"It was {text.removeprefix(f'{run.name}: ')}."
+        if run.not_safe and interrupted != STOPPED:
+            text = f"{text.removesuffix('.')}; not made safe: {run.not_safe}"
+        if interrupted and self.held_by:
+            text = f"{text} {self.held_by} still holds the fibre."
+        advice = " Look at the tools, press Reset, then go on."
+        return text + advice if interrupted == STOPPED else text
 
     def _on_replayed(
         self, run: ProcedureRun[HandlingContext], operations: tuple[SingleOperation, ...]
@@ -476,7 +536,12 @@ class FibreHandling:
             text = "Every step was carried out."
             result = OperationResult(f"Replay {run.name}", good=True, text=text)
         else:
-            result = OperationResult(f"Replay {run.name}", good=False, text=_failed(run))
+            result = OperationResult(
+                f"Replay {run.name}",
+                good=False,
+                text=self._failed(run),
+                interrupted=_interrupted(run),
+            )
         self._end(result)
 
     def _end(self, result: OperationResult) -> None:
@@ -536,13 +601,10 @@ def _forget_moves(rig: Applications) -> None:
         application.undo.forget_all()
 
 
-def _failed(run: ProcedureRun[HandlingContext]) -> str:
-    failure = run.failure
-    stopped = isinstance(failure, ProcedureStopped)
-    text = str(failure)
-    if run.not_safe and not stopped:
-        text = f"{text}; not made safe: {run.not_safe}"
-    return text
+def _interrupted(run: ProcedureRun[HandlingContext]) -> str:
+    if isinstance(run.failure, ProcedureStopped):
+        return STOPPED
+    return ENDED if isinstance(run.failure, ProcedureAborted) else ""
 
 
 def _found(

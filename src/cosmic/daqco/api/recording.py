@@ -233,6 +233,9 @@ class Recording:
     def positions(self, axis: str) -> tuple[Values, Values, npt.NDArray[np.str_]]:
         """Return where an axis was: times, positions in its unit, and how well they were known.
 
+        Times never go back: files from before December 2026 have positions of a moving gripper
+        with the time at which the program began.
+
         Raises
         ------
         RecordingError
@@ -244,6 +247,7 @@ class Recording:
             raise RecordingError(f"{self.path}: there is no axis {axis!r}; recorded: {known}")
         rows = self._source.tables["positions"]
         rows = rows[rows["axis"] == names.index(axis)]
+        rows = rows[rows["time_s"] >= np.maximum.accumulate(rows["time_s"])]
         words = np.array([_CONFIDENCE.get(each, "unknown") for each in rows["confidence"].tolist()])
         return rows["time_s"].copy(), rows["position"].copy(), words.astype(np.str_)
 

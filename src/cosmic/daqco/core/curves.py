@@ -1,5 +1,6 @@
 """A straight line through a measured curve, with how sure it is."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +36,14 @@ class Slope:
     offset: float
     residual: float
     samples: int
+
+    @property
+    def text(self) -> str:
+        """Value and standard error, with two figures of the error, and the unit."""
+        error = self.standard_error
+        known = math.isfinite(error) and error > 0.0
+        digits = min(6, max(0, 1 - math.floor(math.log10(error)))) if known else 3
+        return f"{self.value:.{digits}f} ± {error:.{digits}f} {self.unit}"
 
 
 def fit_slope(positions: Values, values: Values, unit: str = "") -> Slope:

@@ -26,3 +26,14 @@ def duration_text(duration_s: float) -> str:
     if seconds >= 60:
         return f"{seconds // 60} min {seconds % 60:02d} s"
     return f"{max(0.0, duration_s):.1f} s"
+
+
+def clock_text(duration_s: float) -> str:
+    """Return a time in little room, such as "12.3 s", "2:05" or "1:02:05"."""
+    if math.isnan(duration_s) or duration_s < 60.0:
+        return duration_text(duration_s)
+    seconds = int(duration_s)
+    minutes = f"{seconds // 60 % 60:02d}:{seconds % 60:02d}"
+    if seconds >= 3600:
+        return f"{seconds // 3600}:{minutes}"
+    return minutes.removeprefix("0")

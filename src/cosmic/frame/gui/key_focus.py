@@ -21,6 +21,16 @@ def takes_text(widget: QWidget | None) -> bool:
     return isinstance(widget, (QLineEdit, QPlainTextEdit, QTextEdit, QAbstractSpinBox))
 
 
+def set_shown(widget: QWidget, owner: QWidget, *, shown: bool) -> None:
+    """Show or hide a widget; what has the focus when it goes leaves it to `owner`.
+
+    Qt would give it to the next widget of the window, and Space would press that.
+    """
+    if not shown and widget.hasFocus():
+        owner.setFocus()
+    widget.setVisible(shown)
+
+
 def escape_is_for(widget: QWidget | None) -> bool:
     """Tell whether Escape has something to cancel that `widget`, with the focus, belongs to.
 

@@ -54,7 +54,7 @@ class StateBadge(QWidget):
 
     def __init__(self, state: State = State.UNKNOWN, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._state = state
+        self._state, self._word = state, ""
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setFont(number_font(_FONT_PX, bold=True))
         self.set_state(state)
@@ -64,10 +64,15 @@ class StateBadge(QWidget):
         """What is shown."""
         return self._state
 
-    def set_state(self, state: State, detail: str = "") -> None:
-        """Show `state`; `detail` says more in the tooltip."""
-        self._state = state
-        text = f"{state.value}: {detail}" if detail else state.value
+    @property
+    def word(self) -> str:
+        """What is written."""
+        return self._word or self._state.value
+
+    def set_state(self, state: State, detail: str = "", *, word: str = "") -> None:
+        """Show `state`, by another word where that says it better; `detail` is in the tooltip."""
+        self._state, self._word = state, word
+        text = f"{self.word}: {detail}" if detail else self.word
         if text != self.toolTip():
             self.setToolTip(text)
             self.setAccessibleName(text)
@@ -101,7 +106,7 @@ class StateBadge(QWidget):
             self._paint_shape(painter, place, QColor(look.text if loud else look.colour))
             painter.setPen(QColor(look.text))
             room = box.adjusted(1.5 * STEP_PX + _SHAPE_PX, 0.0, 0.0, 0.0)
-            painter.drawText(room, int(Qt.AlignmentFlag.AlignVCenter), look.word)
+            painter.drawText(room, int(Qt.AlignmentFlag.AlignVCenter), self._word or look.word)
 
     def _paint_shape(self, painter: QPainter, place: QRectF, colour: QColor) -> None:
         hollow = self._state is State.UNKNOWN

@@ -224,6 +224,12 @@ QProgressBar[look="bar"] { min-height: 8px; border: none; }
 #chip[tone="warning"] { background: $warning; color: $ink; }
 #chip[tone="quiet"] { background: $raised; color: $text; }
 #topBar[latched="true"] #chip[tone="simulated"] { color: $on_stop; border-color: $on_stop; }
+#topBar[latched="true"] #chip[tone="quiet"], #topBar[latched="true"] #chip[tone="real"] {
+    color: $text;
+}
+#topBar[latched="true"] #chip[tone="warning"], #topBar[latched="true"] #chip[tone="alarm"] {
+    color: $ink;
+}
 QPushButton[watched="false"], QPushButton[watched="false"]:hover {
     background: $alarm; color: $ink; border-color: $alarm;
 }

@@ -433,7 +433,8 @@ class TopBar(QWidget):
     def set_latched(self, reason: str | None) -> None:
         """Turn the whole bar into the notice that the stop is latched; None ends that."""
         self._latched = reason is not None
-        self._latched_text.set_text(f"■ STOPPED: {reason}" if reason else "■ STOPPED")
+        words = f"■ STOPPED: {reason}" if reason else "■ STOPPED"
+        self._latched_text.set_text(words, "■ STOPPED", "STOPPED")
         self._pages.setCurrentIndex(1 if self._latched else 0)
         if self.property("latched") == self._latched:
             return

@@ -312,6 +312,13 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
     def drawBackground(self, painter: QPainter, rect: QRectF) -> None:
         painter.fillRect(rect, QColor(current_palette().field))
 
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self.resetCachedContent()  # pyqtgraph has the background kept, in the theme of before
+            self.viewport().update()
+
     def redraw(self) -> None:
         """Draw the layers anew."""
         self.viewport().update()

@@ -91,6 +91,28 @@ class CampaignDock(QObject):
         campaign = panel.campaign if panel is not None else None
         return campaign is not None and not campaign.over
 
+    @property
+    def unfinished(self) -> bool:
+        """True where the campaign begun here last ended early: it can be resumed."""
+        panel = self._late.made
+        campaign = panel.campaign if panel is not None else None
+        return campaign is not None and campaign.over and campaign.unfinished
+
+    @property
+    def finished(self) -> bool:
+        """True where the campaign begun here last came to its end."""
+        panel = self._late.made
+        campaign = panel.campaign if panel is not None else None
+        return campaign is not None and campaign.over and not campaign.unfinished
+
+    def resume(self) -> None:
+        """Have the campaign that ended early go on."""
+        self.panel.procedure.resume.click()
+
+    def show_report(self) -> None:
+        """Write the report of the campaign, and open it."""
+        self.panel.report.click()
+
     def _load(self) -> None:
         """Load statistics and all that the panel needs while nobody waits for it."""
         if PANEL in sys.modules:

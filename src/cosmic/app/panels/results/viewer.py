@@ -355,7 +355,7 @@ class ResultViewer(QWidget):
             unit = self.curves.unit
             of = f"{name}: " if len(self.curves.lines) > 1 else ""
             texts.append(
-                f"{of}slope {line.value:.3f} ± {line.standard_error:.3f} {line.unit}   "
+                f"{of}slope {line.text}   "
                 f"difference {float(what[-1] - what[0]):.2f} {unit}   "
                 f"mean {float(what.mean()):.2f} {unit}"
             )

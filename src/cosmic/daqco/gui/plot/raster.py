@@ -80,6 +80,7 @@ class Raster:
             self.clear()
             return
         self.look = look
+        self._paint_grid()  # what has no columns yet has the other look, too
         self._paint(max(0, self.head - self.width + 1), self.head)
 
     def show(self, first: int, columns: Columns) -> None:
