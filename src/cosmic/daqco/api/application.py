@@ -48,8 +48,11 @@ logger = logging.getLogger(__name__)
 T = TypeVar("T")
 
 FIRST_DATA_S: Final = 1.0
-MORE_CHUNKS: Final = 2.0
-"""How many times more chunks a simulation at a rate makes, on the wall; then they grow."""
+MORE_CHUNKS: Final = 0.5
+"""How many chunks for one asked for a fast simulation makes on the wall; else they grow.
+
+With two it had no other work: they, not the rate, said how fast a campaign went.
+"""
 LONGEST_CHUNK_S: Final = 0.25
 """They must come, at the pace of the wall too, before they are missed."""
 
