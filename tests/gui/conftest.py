@@ -84,7 +84,7 @@ def quick_platform() -> Iterator[None]:
         patch.setattr(collision_manager, "GateProcess", InProcess)
         patch.setattr(scene_loader, "load_scene", _cached)
         # Nothing here needs a sample as soon as it is there.
-        patch.setattr(daqco_application, "MORE_CHUNKS", 0.1)
+        patch.setattr(daqco_application, "LONGER", 10.0)
         # A computer that runs tests is busy; the alarm has tests of its own.
         patch.setattr(alarm_watch, "processor_load", lambda: None)
         yield
