@@ -45,6 +45,8 @@ SIZES = {
     "1920x1080 at 150 %": (1280, 720),
     "1920x1080": (1920, 1080),
 }
+SLOW = 2.0
+"""A rate where little moves: at 20 the cameras keep a core busy with 600 images a second."""
 WITH_PICTURE = (LOOK, HANDLE, MEASURE)
 LEFT = Qt.MouseButton.LeftButton
 
@@ -52,7 +54,7 @@ LEFT = Qt.MouseButton.LeftButton
 @pytest.fixture
 def own(make: Make, qtbot: QtBot) -> OperatorWindow:
     """A window of all applications whose first image is there."""
-    window = make(applications=("mico", "daqco", "vico"))
+    window = make(applications=("mico", "daqco", "vico"), rate=SLOW)
     with_image(window, qtbot)
     return window
 
@@ -170,7 +172,7 @@ def settled(qtbot: QtBot, look: Callable[[], list[str]]) -> list[str]:
 def test_the_picture_has_most_of_the_window_and_nothing_is_cut_off(
     make: Make, qtbot: QtBot, size: tuple[int, int], theme: str
 ) -> None:
-    window = make(applications=("mico", "daqco", "vico"), size=size)
+    window = make(applications=("mico", "daqco", "vico"), rate=SLOW, size=size)
     with_image(window, qtbot)
     window.set_theme(theme)
     assert window.workspaces is not None
