@@ -12,6 +12,7 @@ from typing_extensions import override
 
 from cosmic.app.configuration import platform_file
 from cosmic.app.windows import alarm_watch
+from cosmic.daqco.api import application as daqco_application
 from cosmic.mico.core.collision import collision_manager, scene_loader
 from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
 from cosmic.mico.core.collision.clear_travel import clear_travel
@@ -82,6 +83,8 @@ def quick_platform() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(collision_manager, "GateProcess", InProcess)
         patch.setattr(scene_loader, "load_scene", _cached)
+        # Nothing here needs a sample as soon as it is there.
+        patch.setattr(daqco_application, "LONGER", 10.0)
         # A computer that runs tests is busy; the alarm has tests of its own.
         patch.setattr(alarm_watch, "processor_load", lambda: None)
         yield

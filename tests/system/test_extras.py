@@ -1,9 +1,9 @@
 """What works without the extras, what names a missing one, and a station without widgets."""
 
+import json
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -50,47 +50,59 @@ def run(code: str, *blocked: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize("extra", ASKED)
-def test_what_needs_an_extra_names_it_where_it_is_missing(extra: str) -> None:
-    code = f"""
-from cosmic.frame.errors import CosmicError
-{ASKED[extra]}
+@pytest.fixture(scope="module")
+def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """What a program without any extra said, by what it was asked; started once for all."""
+    file = tmp_path_factory.mktemp("without") / "run.h5"
+    parts = "".join(
+        f"""
+{code}
 try:
-    ask()
-except CosmicError as exc:
-    print(exc)
+    said[{extra!r}] = repr(ask())
+except cosmic.CosmicError as exc:
+    said[{extra!r}] = str(exc)
 """
-    done = run(code, *EXTRAS)
-    assert f"needs the extra '{extra}': pip install cosmic[{extra}]" in done.stdout, done.stderr
-
-
-def test_an_export_to_tdms_names_its_extra_and_leaves_nothing(tmp_path: Path) -> None:
-    code = f"""
+        for extra, code in ASKED.items()
+    )
+    done = run(
+        f"""
+import json, os
 import cosmic
-with cosmic.connect(applications=("daqco",), rate=20.0) as rig:
-    with rig.daqco.record({str(tmp_path / "run.h5")!r}):
+said = {{}}
+with cosmic.connect(rate=20.0) as rig:
+    rig.mico["left.x"].move_by(5.0)
+    said["run"] = f"{{rig.vico.snap().shape}} {{sorted(rig.daqco.latest())}}"
+    with rig.daqco.record({str(file)!r}):
         pass
 from cosmic.daqco.api.export import export_file
 try:
-    export_file({str(tmp_path / "run.h5")!r}, "tdms")
+    export_file({str(file)!r}, "tdms")
 except cosmic.NotAvailable as exc:
-    print(exc)
-"""
-    done = run(code, *EXTRAS)
-    assert "Export to TDMS needs the extra 'tdms': pip install cosmic[tdms]" in done.stdout, done
-    assert [each.name for each in tmp_path.iterdir() if "tdms" in each.name] == []
-
-
-def test_all_applications_run_without_any_extra() -> None:
-    code = """
-import cosmic
-with cosmic.connect(rate=20.0) as rig:
-    rig.mico["left.x"].move_by(5.0)
-    print(rig.vico.snap().shape, sorted(rig.daqco.latest()))
-"""
-    done = run(code, *EXTRAS)
+    said["export"] = str(exc)
+said["folder"] = " ".join(os.listdir({str(file.parent)!r}))
+{parts}
+print(json.dumps(said))
+""",
+        *EXTRAS,
+    )
     assert done.returncode == 0, done.stderr
-    assert "force" in done.stdout
+    found: dict[str, str] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+@pytest.mark.parametrize("extra", ASKED)
+def test_what_needs_an_extra_names_it_where_it_is_missing(said: dict[str, str], extra: str) -> None:
+    assert f"needs the extra '{extra}': pip install cosmic[{extra}]" in said[extra]
+
+
+def test_an_export_to_tdms_names_its_extra_and_leaves_nothing(said: dict[str, str]) -> None:
+    assert "Export to TDMS needs the extra 'tdms': pip install cosmic[tdms]" in said["export"]
+    assert "run.h5" in said["folder"]
+    assert "tdms" not in said["folder"]
+
+
+def test_all_applications_run_without_any_extra(said: dict[str, str]) -> None:
+    assert "force" in said["run"]
 
 
 def test_a_station_needs_no_widgets() -> None:

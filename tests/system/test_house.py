@@ -45,7 +45,7 @@ WATCHED_IMPORT = """
 import importlib, json, sys
 
 SILENT = {"socket.connect", "socket.bind", "subprocess.Popen", "_thread.start_new_thread"}
-root, modules, seen, current = sys.argv[1], json.loads(sys.argv[2]), [], ""
+root, groups, seen, current = sys.argv[1], json.loads(sys.argv[2]), [], ""
 
 def watch(event, args):
     if event in SILENT:
@@ -58,52 +58,54 @@ def watch(event, args):
 import ctypes, h5py, logging, numpy, pydantic.fields  # what they do is their affair
 import PySide6.QtCore  # after pydantic: its import hook trips over pydantic's lazy modules
 sys.addaudithook(watch)
-for current in modules:
-    importlib.import_module(current)
+first_with_widgets = {}
+for group, modules in groups.items():
+    for current in modules:
+        importlib.import_module(current)
+        loaded = {"PySide6.QtWidgets", "PySide6.QtGui", "pyqtgraph"} & set(sys.modules)
+        if loaded and group not in first_with_widgets:
+            first_with_widgets[group] = f"{current} loads {loaded}"
 current = "afterwards"
 if PySide6.QtCore.QCoreApplication.instance() is not None:
     seen.append("there is an application object")
-print(json.dumps(seen))
+print(json.dumps([seen, first_with_widgets]))
 """
 
 
-def _run_python(code: str, *arguments: str) -> str:
+@cache
+def _imported_one_by_one() -> tuple[list[str], dict[str, str]]:
+    """Return what importing our modules did, and which first loaded widgets: once for all tests."""
+    modules = _modules()
+    assert len(modules) > 20
+    groups = {
+        "script": ["cosmic", "cosmic.app.rig"],
+        "plain": [module for module in modules if not _has_widgets(module)],
+        "rest": [module for module in modules if _has_widgets(module)],
+    }
     done = subprocess.run(
-        [sys.executable, "-B", "-c", code, *arguments],
+        [sys.executable, "-B", "-c", WATCHED_IMPORT, str(SOURCE), json.dumps(groups)],
         capture_output=True,
         text=True,
         timeout=100,
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    return done.stdout
+    seen, first_with_widgets = json.loads(done.stdout.splitlines()[-1])
+    return seen, first_with_widgets
 
 
 def test_importing_any_module_opens_no_file_no_window_and_starts_no_thread() -> None:
-    modules = _modules()
-    assert len(modules) > 20
-    seen = _run_python(WATCHED_IMPORT, str(SOURCE), json.dumps(modules))
-    assert json.loads(seen.splitlines()[-1]) == []
-
-
-FIRST_WITH_WIDGETS = """
-import importlib, json, sys
-for module in json.loads(sys.argv[1]):
-    importlib.import_module(module)
-    loaded = {"PySide6.QtWidgets", "PySide6.QtGui", "pyqtgraph"} & set(sys.modules)
-    if loaded:
-        print(module, "loads", *loaded)
-        break
-"""
-
-
-def test_modules_outside_gui_and_app_load_no_widgets() -> None:
-    plain = [module for module in _modules() if not _has_widgets(module)]
-    assert _run_python(FIRST_WITH_WIDGETS, json.dumps(plain)) == ""
+    seen, first_with_widgets = _imported_one_by_one()
+    assert "rest" in first_with_widgets, "widgets are seen where there are some"
+    assert seen == []
 
 
 def test_a_script_that_connects_loads_no_widgets() -> None:
-    assert _run_python(FIRST_WITH_WIDGETS, json.dumps(["cosmic", "cosmic.app.rig"])) == ""
+    assert "script" not in _imported_one_by_one()[1]
+
+
+def test_modules_outside_gui_and_app_load_no_widgets() -> None:
+    assert "plain" not in _imported_one_by_one()[1]
 
 
 def test_methods_that_qt_calls_are_marked_with_the_override_that_survives_an_exception() -> None:

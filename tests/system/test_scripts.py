@@ -30,7 +30,9 @@ def test_the_steps_of_the_tests_are_the_same_on_windows() -> None:
     )
     loop = re.search(r"for system in ([\w ]+);", shell("test"))
     assert loop is not None
-    here = set(re.findall(r'^ *(?:if .*then )?check "([^"]+)"', shell("test"), re.MULTILINE))
+    here = set(
+        re.findall(r'^ *(?:if .*then )?(?:check|begin) "([^"]+)"', shell("test"), re.MULTILINE)
+    )
     here.remove("mypy $system")
     here |= {f"mypy {each}" for each in loop[1].replace("win32", "linux").split()}
     assert there == here

@@ -182,10 +182,12 @@ class TimeScale:
         wall_s = self._read_wall_s()
         passed_s, self._wall_s = wall_s - self._wall_s, wall_s
         fast_s = passed_s
-        if self._leading:
+        if self._leading and self._busy:
+            fast_s = 0.0
+        elif self._leading:
             due_s = min((each.due_s for each in self._waits.values()), default=math.inf)
             ahead_s = due_s - self._now_s
-            fast_s = 0.0 if self._busy else min(passed_s, max(0.0, ahead_s / self._rate))
+            fast_s = min(passed_s, max(0.0, ahead_s / self._rate))
         self._go_on(fast_s * self._rate + (passed_s - fast_s) * self._slow)
         if wall_s - self._marks[-1][0] >= REACHED_EVERY_S:
             self._marks.append((wall_s, self._now_s))

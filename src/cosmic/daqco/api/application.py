@@ -48,8 +48,11 @@ logger = logging.getLogger(__name__)
 T = TypeVar("T")
 
 FIRST_DATA_S: Final = 1.0
-MORE_CHUNKS: Final = 2.0
-"""How many times more chunks a simulation at a rate makes, on the wall; then they grow."""
+LONGER: Final = 2.0
+"""By so many times what was asked for chunks grow with each time a simulation is faster.
+
+With 0.5 one at rate 20 had no other work: they, not the rate, said how fast a campaign went.
+"""
 LONGEST_CHUNK_S: Final = 0.25
 """They must come, at the pace of the wall too, before they are missed."""
 
@@ -340,8 +343,8 @@ class DaqcoApplication(TaskApplication):
             settings = self._settings
             # Many more of them on the wall than were asked for would be too many, however fast a
             # simulation runs; but who waits for samples waits for their chunk.
-            longer_s = min(settings.chunk_s * self.clock.rate / MORE_CHUNKS, LONGEST_CHUNK_S)
-            chunk_s = max(settings.chunk_s, longer_s)
+            longer = 1.0 + LONGER * max(0.0, self.clock.rate - 1.0)
+            chunk_s = max(settings.chunk_s, min(longer * settings.chunk_s, LONGEST_CHUNK_S))
             plan = make_plan(
                 settings.channel, settings.rate_hz, chunk_s, self._infos, settings.camera_trigger
             )

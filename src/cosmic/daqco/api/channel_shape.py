@@ -133,14 +133,17 @@ class ChannelHandle:
         status = PlanStatus(f"averaging {self._channel}")
         since_s, average_s = self._clock.now_s(), self._average_s
         parts: list[Values] = []
+        count = 0
 
         def take(chunk: DataChunk) -> None:
+            nonlocal count
             if status.done:
                 return
             values = samples_of(chunk, self._channel, since_s)
             parts.append(values)
+            count += len(values)
             wanted = max(2, round(average_s * chunk.rate_hz))
-            if sum(map(len, parts)) >= wanted:
+            if count >= wanted:
                 self._keep(parts, wanted, since_s + 0.5 * average_s)
                 status.finish()
 

@@ -142,8 +142,10 @@ def _describe(array: np.ndarray[Any, Any], arrays: list[np.ndarray[Any, Any]]) -
 
 
 @cache
-def _hints(cls: type) -> dict[str, Any]:
-    return get_type_hints(cls)
+def _wanted(cls: type) -> dict[str, Any]:
+    """Return the annotations of what makes one of `cls`, by name in its order."""
+    hints = get_type_hints(cls)
+    return {each.name: hints[each.name] for each in fields(cls) if each.init}
 
 
 class _Reader:
@@ -238,13 +240,13 @@ def _data(said: list[Any]) -> object:
     cls = known_class(said[0]) if len(said) == 2 else None
     if cls is None or not is_dataclass(cls) or not isinstance(said[1], list):
         raise ProtocolError(f"a value of an unknown class came: {said[:1]!r}"[:200])
-    wanted = [each.name for each in fields(cls) if each.init]
+    wanted = _wanted(cls)
     if len(wanted) != len(said[1]):
         raise ProtocolError(f"a {said[0]} of another version came")
     try:
-        hints = _hints(cls)
         values = {
-            name: conform(value, hints[name]) for name, value in zip(wanted, said[1], strict=True)
+            name: conform(value, hint)
+            for (name, hint), value in zip(wanted.items(), said[1], strict=True)
         }
         return cls(**values)
     except (Mismatch, TypeError, ValueError, ConfigError) as exc:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import is_dataclass
 from datetime import datetime
 from enum import Enum
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, Literal, Union, get_args, get_origin
 
@@ -15,6 +16,9 @@ from cosmic.frame.config import StrictModel
 _PLAIN: Final = (bool, int, str, bytes, datetime, type(None))
 _SEQUENCES: Final = (list, Sequence, Iterable)
 _MAPPINGS: Final = (dict, Mapping)
+
+
+_origin: Final = cache(get_origin)  # states and samples come some hundred times a second
 
 
 class Mismatch(Exception):  # noqa: N818 - private to this package
@@ -34,7 +38,7 @@ def conform(value: object, annotation: Any) -> object:
         raise _mismatch(value, annotation)
     if annotation is None:
         annotation = type(None)
-    origin = get_origin(annotation)
+    origin = _origin(annotation)
     if origin is not None:
         return _conform_generic(value, annotation, origin)
     if _is_plain_match(value, annotation):
