@@ -48,11 +48,9 @@ logger = logging.getLogger(__name__)
 T = TypeVar("T")
 
 FIRST_DATA_S: Final = 1.0
-LONGER: Final = 2.0
-"""By so many times what was asked for chunks grow with each time a simulation is faster.
+LONGER: Final = 1.0
+"""How many times as much a chunk of a simulation has, for each time that it is faster."""
 
-With 0.5 one at rate 20 had no other work: they, not the rate, said how fast a campaign went.
-"""
 LONGEST_CHUNK_S: Final = 0.25
 """They must come, at the pace of the wall too, before they are missed."""
 
@@ -341,10 +339,10 @@ class DaqcoApplication(TaskApplication):
             self._end_core()
             self._check_hung()
             settings = self._settings
-            # Many more of them on the wall than were asked for would be too many, however fast a
-            # simulation runs; but who waits for samples waits for their chunk.
-            longer = 1.0 + LONGER * max(0.0, self.clock.rate - 1.0)
-            chunk_s = max(settings.chunk_s, min(longer * settings.chunk_s, LONGEST_CHUNK_S))
+            # However fast a simulation runs, on the wall there are no more than were asked for, or
+            # it would do nothing else; but who waits for samples waits for their chunk.
+            longer_s = min(LONGER * self.clock.rate * settings.chunk_s, LONGEST_CHUNK_S)
+            chunk_s = max(settings.chunk_s, longer_s)
             plan = make_plan(
                 settings.channel, settings.rate_hz, chunk_s, self._infos, settings.camera_trigger
             )
