@@ -183,8 +183,13 @@ class _Rules:
             return Step("The operation runs; its card is on the image. Escape or STOP stops it.")
         request = operations.next_request()
         if request is not None:
-            holder = operations.handling.held_by
-            text = f"The {holder} gripper holds a fibre. {request.title} comes next."
+            handling = operations.handling
+            text = f"The {handling.held_by} gripper holds a fibre. {request.title} comes next."
+            if handling.may_hold:
+                text = (
+                    f"The {handling.may_hold} gripper was opened since it took the fibre: whether "
+                    "it still holds it is not known. Put away looks at the jaws."
+                )
             return Step(text, request.title, lambda: operations.begin(request))
         if spaces.current != "Handle":
             return None

@@ -34,6 +34,7 @@ from cosmic.autonomy.shipped.single import (
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.events import Event, Unsubscribe
 from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.news import AxisEnded, MovementNews
 from cosmic.mico.core.motion.positioner import positions_of
 
 logger = logging.getLogger(__name__)
@@ -181,6 +182,7 @@ class FibreHandling:
         self._result: OperationResult | None = None
         self._request: OperationRequest | None = None
         self._changed: Event[[]] = Event()
+        self._forget_movements = rig.mico.follow_movements(self._on_movement)
 
     @override
     def __repr__(self) -> str:
@@ -216,15 +218,26 @@ class FibreHandling:
 
     @property
     def fibre(self) -> HeldFibre | None:
-        """The fibre that is held, with all that became known of it."""
-        work = self._contexts.get(self._gripper)
-        fibre = work.fibre if work is not None else None
-        return fibre if fibre is not None and fibre.held else None
+        """The fibre that is held, with all that became known of it; None also where in doubt."""
+        carried = self._carried
+        return carried if carried is not None and not carried.doubted else None
 
     @property
     def held_by(self) -> str:
-        """Which gripper holds a fibre; empty for none."""
+        """Which gripper holds a fibre; empty for none, and where that is in doubt."""
         return self._gripper if self.fibre is not None else ""
+
+    @property
+    def may_hold(self) -> str:
+        """Which gripper was opened, by no operation, since it took a fibre; empty for none."""
+        return self._gripper if self._carried is not None and self.fibre is None else ""
+
+    @property
+    def _carried(self) -> HeldFibre | None:
+        """The fibre that was taken and not put away since."""
+        work = self._contexts.get(self._gripper)
+        fibre = work.fibre if work is not None else None
+        return fibre if fibre is not None and fibre.held else None
 
     @property
     def at_probe(self) -> bool:
@@ -242,7 +255,7 @@ class FibreHandling:
         return self._done[-1] if self._done else None
 
     def subscribe(self, listener: Callable[[], object]) -> Unsubscribe:
-        """Call `listener()` when an operation has begun or ended, in any thread."""
+        """Call `listener()` when an operation began or ended, or a fibre is in doubt; any thread."""
         return self._changed.subscribe(listener)
 
     # What can be done
@@ -259,8 +272,10 @@ class FibreHandling:
             return self._why_not_take(request)
         if request.operation is SingleOperation.CLOSE:
             return self._why_no_gripper(request)
-        if self.fibre is None:
+        if self._carried is None:
             return "no gripper holds a fibre; take one first"
+        if request.operation is not SingleOperation.PUT_AWAY and (doubt := self._doubt()):
+            return f"{doubt}; put it away first"
         if request.operation is SingleOperation.UNDO:
             return "" if self._done else "there is nothing to undo"
         most = self._settings.push.limit_un
@@ -273,9 +288,17 @@ class FibreHandling:
     def _why_not_take(self, request: OperationRequest) -> str:
         if request.marked is None:
             return "no fibre is marked; find the fibres, and choose one in the image"
+        if doubt := self._doubt():
+            return f"{doubt}; put it away first"
         if self.fibre is not None:
             return f"{self._gripper} holds a fibre; put it away first"
         return self._why_no_gripper(request) or self._why_not_at_zoom(request, request.marked)
+
+    def _doubt(self) -> str:
+        """Return what is not known of the fibre that was taken, or nothing."""
+        if not self.may_hold:
+            return ""
+        return f"{self._gripper} was opened since it took a fibre, and may hold it or not"
 
     def _why_not_at_zoom(self, request: OperationRequest, marked: MarkedFibre) -> str:
         """Return why a fibre cannot be found again from the zoom of its image, or nothing.
@@ -389,9 +412,9 @@ class FibreHandling:
             if taking:
                 self._gripper, self._done = request.gripper, []
                 work.shared.surveyed = False
-            self._request = request
+            self._request, doubted = request, bool(self.may_hold)
             return self._made(
-                procedure, work, lambda run: self._on_end(request, run, push, closing)
+                procedure, work, lambda run: self._on_end(request, run, push, closing, doubted)
             )
 
     def prepare_recorded(
@@ -418,6 +441,8 @@ class FibreHandling:
             if self.running or self._busy():
                 what = self._busy() or "an operation"
                 raise NotAvailable(f"{procedure.name}: {what} is running; end it first")
+            if doubt := self._doubt():
+                raise NotAvailable(f"{procedure.name}: {doubt}; put it away first")
             if self.fibre is not None and gripper != self._gripper:
                 raise NotAvailable(f"{self._gripper} holds a fibre; put it away first")
             work = self.context(gripper)
@@ -492,12 +517,15 @@ class FibreHandling:
         run: ProcedureRun[HandlingContext],
         push: PushToForce,
         closing: CloseGently,
+        doubted: bool,
     ) -> None:
         work = run.work
         work.shared.unsuitable = []
         if run.failure is None:
             closed = request.operation is SingleOperation.CLOSE
             values, text = _closed(work, closing) if closed else _found(request, work, push)
+            if doubted and work.fibre is None:
+                text = f"{work.settings.gripper} is empty; where the fibre came off is not known."
             result = OperationResult(request.title, good=True, text=text, values=values)
             self._note_done(request.operation)
         else:
@@ -525,6 +553,26 @@ class FibreHandling:
             text = f"{text} {self.held_by} still holds the fibre."
         advice = " Look at the tools, press Reset, then go on."
         return text + advice if interrupted == STOPPED else text
+
+    def _on_movement(self, news: MovementNews) -> None:
+        """See whether the jaws that hold a fibre were opened, by no operation; device threads."""
+        fibre, work = self._carried, self._contexts.get(self._gripper)
+        if not isinstance(news, AxisEnded) or fibre is None or work is None or self.running:
+            return
+        if news.name != work.gripper.gap_axis or news.position is None:
+            return
+        known = not fibre.doubted
+        fibre.note_opening(news.position)
+        work.gap_um = fibre.opened_um(news.position)
+        if known and fibre.doubted:
+            text = (
+                f"The jaws of {self._gripper} were opened: whether they still hold fibre "
+                f"{fibre.number} is not known. Put away opens them over the bin, and looks."
+            )
+            self._done = []
+            self._result = OperationResult("Jaws opened", good=False, text=text)
+            logger.info("%s", text)
+            self._changed.emit()
 
     def _on_replayed(
         self, run: ProcedureRun[HandlingContext], operations: tuple[SingleOperation, ...]
@@ -562,6 +610,7 @@ class FibreHandling:
 
     def close(self) -> None:
         """Abort what runs, and let go of the force channel; harmless the second time."""
+        self._forget_movements()
         run = self._run
         if run is not None and self.running:
             run.abort("the platform is closed")
