@@ -32,8 +32,8 @@ def what_is_lost(rig: Rig, operations: FibreOperations | None, *, force: bool) -
         )
     if handling is not None and handling.held_by:
         found.append(
-            f"The {handling.held_by} gripper holds a fibre: it stays in the jaws, and nothing knows of it "
-            "at the next start. Put it away first."
+            f"The {handling.held_by} gripper holds a fibre: it stays in the jaws, and nothing "
+            "knows of it at the next start. Put it away first."
         )
     if force:
         try:
