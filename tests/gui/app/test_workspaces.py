@@ -526,7 +526,7 @@ def test_the_coach_says_what_a_calibration_high_above_the_plate_is_not_good_for(
     plane = Plane(zoom, 1500.0, fit_map(seen), datetime.now(UTC))
     transform.calibrations.add_plane(camera.name, "left", plane)
     qtbot.waitUntil(lambda: "Not calibrated for what lies on the plate" in words.text())
-    assert "height 0 um lies outside what was measured (1500 um)" in words.text()
+    assert "height 0 µm lies outside what was measured (1500 µm)" in words.text()
     assert "Bring a tool down" in words.text()
 
 
