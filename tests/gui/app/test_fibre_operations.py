@@ -217,6 +217,7 @@ def test_jaws_opened_in_the_panel_leave_the_fibre_in_doubt(make: Make, qtbot: Qt
     qtbot.keyClick(width, Qt.Key.Key_Return)
     card = found.card
     qtbot.waitUntil(lambda: "were opened" in card.line.text())
+    assert card.badge.word == "IN DOUBT"
     assert "whether they still hold fibre 1 is not known" in card.line.text()
     assert card.next.isVisible()
     assert card.next.text() == "Put away"

@@ -40,6 +40,7 @@ from cosmic.mico.core.motion.positioner import positions_of
 logger = logging.getLogger(__name__)
 
 USUAL_FORCE_UN: Final = 50.0
+IN_DOUBT: Final = "in doubt"
 ENDED: Final = "ended"
 """What an operation is called that whoever watched over it has ended."""
 GRIPPERS: Final[tuple[str, ...]] = get_args(HandlingSettings.model_fields["gripper"].annotation)
@@ -105,7 +106,8 @@ class OperationResult:
     values : tuple of (str, str)
         What was measured: a name, and the value with its 95 % interval and unit.
     interrupted : str
-        "stopped" by the stop, or "ended" by whoever watched over it; empty where it was neither.
+        "stopped" by the stop, "ended" by whoever watched over it, or "in doubt" where the jaws were
+        opened by no operation; empty where it was none of them.
     """
 
     title: str
@@ -591,7 +593,9 @@ class FibreHandling:
                 f"{fibre.number} is not known. Put away opens them over the bin, and looks."
             )
             self._state.done = []
-            self._state.result = OperationResult("Jaws opened", good=False, text=text)
+            self._state.result = OperationResult(
+                "Jaws opened", good=False, text=text, interrupted=IN_DOUBT
+            )
             logger.info("%s", text)
             self._state.changed.emit()
 

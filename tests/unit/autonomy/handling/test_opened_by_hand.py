@@ -58,6 +58,7 @@ def test_jaws_opened_wide_by_hand_may_hold_the_fibre_or_not(rig: Rig) -> None:
     assert (handling.held_by, handling.may_hold) == ("", "left")
     assert handling.result is not None
     assert "not known" in handling.result.text
+    assert handling.result.interrupted == "in doubt"
     assert "was opened since" in handling.why_not(OperationRequest(SingleOperation.BRING))
     assert "was opened since" in handling.why_not(OperationRequest(SingleOperation.UNDO))
     assert handling.why_not(OperationRequest(SingleOperation.PUT_AWAY)) == ""
