@@ -3,7 +3,9 @@
 import atexit
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Lock
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self, TypeVar, cast
 from weakref import WeakSet
@@ -38,6 +40,17 @@ W = TypeVar("W")
 A_CAMPAIGN: Final = "a campaign"
 
 
+@dataclass(slots=True, eq=False)
+class SharedRuns:
+    """What runs on a platform, for all who command it in this program."""
+
+    runs: "WeakSet[ProcedureRun[object] | Campaign]" = field(default_factory=WeakSet)
+    handling: "FibreHandling | None" = None
+    control: Control | None = None
+    closed: bool = False
+    lock: Lock = field(default_factory=Lock)
+
+
 @checked_class
 class Rig:
     """The whole platform, as scripts and the console see it; any thread.
@@ -47,24 +60,34 @@ class Rig:
     """
 
     def __init__(
-        self, platform: Platform, source: str = "script", *, at_end: ExitStack | None = None
+        self,
+        platform: Platform,
+        source: str = "script",
+        *,
+        at_end: ExitStack | None = None,
+        shared: SharedRuns | None = None,
     ) -> None:
         self._platform, self._at_end = platform, at_end or ExitStack()
         self._mico = mico_of(platform.mico, source) if platform.mico is not None else None
         self._daqco = daqco_of(platform.daqco) if platform.daqco is not None else None
         self._vico = vico_of(platform.vico) if platform.vico is not None else None
-        self._control: Control | None = None
-        if self._mico is not None:
-            self._control = Control(
+        self._shared = shared or SharedRuns()
+        if self._mico is not None and shared is None:
+            self._shared.control = Control(
                 self._mico,
                 self._daqco,
                 platform.file.control,
                 platform.policy,
                 rate=platform.clock.rate,
             )
-        self._runs: WeakSet[ProcedureRun[object] | Campaign] = WeakSet()
         self._handling: FibreHandling | None = None
-        self._closed = False
+
+    def commanding_as(self, source: str) -> "Rig":
+        """Return the same rig, whose movements are logged by another name, such as "console".
+
+        What runs by one of them runs for the other too; closing one closes both.
+        """
+        return Rig(self._platform, source, at_end=self._at_end, shared=self._shared)
 
     @override
     def __repr__(self) -> str:
@@ -100,9 +123,9 @@ class Rig:
     @property
     def control(self) -> Control:
         """Control loops; raises `NotAvailable` where mico is not hosted."""
-        if self._control is None:
+        if self._shared.control is None:
             raise NotAvailable("mico is not hosted here; a control loop needs axes")
-        return self._control
+        return self._shared.control
 
     def application(self, name: str) -> Any:
         """Return an application of another package, as it offers itself to scripts.
@@ -154,12 +177,13 @@ class Rig:
         """
         from cosmic.app.procedures import campaign_on  # loads statistics, which takes a second
 
-        if self._handling is not None and self._handling.running:
+        handling = self._shared.handling
+        if handling is not None and handling.running:
             raise NotAvailable("an operation on a fibre is running; wait until it has ended")
         if self.running == A_CAMPAIGN:
             raise NotAvailable("a campaign is running; end it first")
         campaign = campaign_on(self, self._platform, recipe, folder, plates)
-        self._runs.add(campaign)
+        self._shared.runs.add(campaign)
         return campaign
 
     @property
@@ -224,7 +248,12 @@ class Rig:
         if self._handling is None:
             from cosmic.autonomy.shipped.fibre_handling import FibreHandling
 
-            self._handling = FibreHandling(self, self.procedure, lambda: self.running)
+            with self._shared.lock:
+                if self._shared.handling is None:
+                    made = FibreHandling(self, self.procedure, lambda: self.running)
+                    self._handling = self._shared.handling = made
+                else:
+                    self._handling = self._shared.handling.commanding_by(self)
         return self._handling
 
     def replay(
@@ -271,11 +300,11 @@ class Rig:
     @property
     def running(self) -> str:
         """Which campaign or procedure runs here, in words; empty for none."""
-        if not self._runs:
+        if not self._shared.runs:
             return ""
         from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 
-        for each in list(self._runs):
+        for each in list(self._shared.runs):
             if isinstance(each, Campaign):
                 if not each.over and each.phase is not CampaignPhase.READY:
                     return A_CAMPAIGN
@@ -302,7 +331,7 @@ class Rig:
             self._platform.policy,
             stopped=stopped_since(self._mico),
         )
-        self._runs.add(cast("ProcedureRun[object]", run))
+        self._shared.runs.add(cast("ProcedureRun[object]", run))
         return run
 
     @property
@@ -419,16 +448,17 @@ class Rig:
 
     def close(self) -> None:
         """Stop everything, release the hold and end all threads; harmless the second time."""
-        if not self._closed:
-            self._closed = True
+        shared = self._shared
+        if not shared.closed:
+            shared.closed = True
             atexit.unregister(self.close)
-            if self._handling is not None:
-                self._handling.close()
-            for run in list(self._runs):
+            if shared.handling is not None:
+                shared.handling.close()
+            for run in list(shared.runs):
                 run.abort("the platform is closed")
                 run.join()
-            if self._control is not None:
-                self._control.close()
+            if shared.control is not None:
+                shared.control.close()
             self._at_end.close()
             self._platform.shut_down()
 

@@ -30,6 +30,8 @@ _QUANTITY: Final = re.compile(
     r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.]*)\s*"
 )
 
+_ASCII_MICRO: Final = re.compile(r"(?<![A-Za-z_'\"`])u(?=[mNV](?![A-Za-z_]))")
+
 DISPLAY: Final = {"um": "µm", "deg": "°", "V": "V", "Hz": "Hz", "steps": "steps"}
 
 
@@ -73,3 +75,8 @@ def format_quantity(value: float, unit: str, decimals: int | None = None) -> str
     digits = {"um": 1, "deg": 4, "V": 1}.get(unit, 0) if decimals is None else decimals
     rounded = round(value, digits) + 0.0  # no minus in front of zero
     return f"{rounded:.{digits}f} {DISPLAY.get(unit, unit)}"
+
+
+def with_micro_signs(text: str) -> str:
+    """Return a sentence for the operator: the units "um", "uN" and "uV" in it as µm, µN, µV."""
+    return _ASCII_MICRO.sub("µ", text)

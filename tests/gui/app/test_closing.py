@@ -65,7 +65,7 @@ def test_closing_asks_while_a_gripper_holds_a_fibre(
     assert window.tasks is not None
     operations = window.tasks.operations
     assert operations is not None
-    held = SimpleNamespace(held_by="left", running=False)
+    held = SimpleNamespace(held_by="left", may_hold="", running=False)
     monkeypatch.setattr(type(operations), "used", True)
     monkeypatch.setattr(type(operations), "handling", held)
     window.close()

@@ -1,6 +1,8 @@
 """Operations on a fibre from the picture: found, right-clicked, taken, bent, put away."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from PySide6.QtCore import QPointF, Qt
@@ -14,12 +16,18 @@ from cosmic.app.platform import build_platform
 from cosmic.app.windows.fibre_menu import FibreOperations
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.app.windows.tasks import HANDLE, MEASURE, TaskLayout
+from cosmic.autonomy.handling.held_fibre import HeldFibre
+from cosmic.autonomy.recorded.operations import Surroundings
+from cosmic.autonomy.recorded.replay import replay_on
+from cosmic.autonomy.recorded.steps import MoveStep, RecordedProcedure
 from cosmic.daqco.gui.main_widget import make_daqco_gui
+from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import State
+from cosmic.mico.api.news import AxisBegun
 from cosmic.mico.gui.mico_widget import make_mico_gui
 from cosmic.twin.truth import read_truth
 from cosmic.vico.gui.vico_gui import make_vico_gui
-from gui.app.windows import Make
+from gui.app.windows import Make, mico
 
 LEFT = Qt.MouseButton.LeftButton
 LONG_MS = 600_000
@@ -176,14 +184,48 @@ def test_a_gripper_closes_gently_and_says_how_far_it_is_open(make: Make, qtbot: 
     tool.move_once("left.gripper", 1)  # by 10 um: a known beginning
     qtbot.waitUntil(lambda: not manager.state("left.gripper").in_motion)
     before = manager.state("left.gripper").position or 0.0
+    told: list[str] = []
+    mico(window).mico.follow_movements(
+        lambda news: told.append(news.source) if isinstance(news, AxisBegun) else None
+    )
     hand = Hand(window, qtbot)
     hand.click(gently)
     card = done(window, qtbot, "Close gently")
+    assert set(told) == {"window"}
     assert (manager.state("left.gripper").position or 0.0) < before
     assert "0 ± 49 µm" in card.findChildren(QLabel, "operationValue")[0].text()
     qtbot.waitUntil(lambda: opening.text() == "0 ± 49 µm")
     assert window.platform.mico.collision is not None
     assert window.platform.mico.collision.allowed_contacts == frozenset()
+
+
+def test_jaws_opened_in_the_panel_leave_the_fibre_in_doubt(make: Make, qtbot: QtBot) -> None:
+    window = with_fibres(make, qtbot)
+    found = operations(window)
+    assert window.platform.mico is not None
+    manager = window.platform.mico.manager
+    qtbot.waitUntil(lambda: manager.state("left.gripper").present)
+    still = RecordedProcedure(name="still", step=[MoveStep(axes={"left.x": 0.0})])
+    replay_on(found.handling, still, Surroundings()).run_here()
+    candidate = cast("Any", SimpleNamespace(candidate=SimpleNamespace(width_um=20.0)))
+    found.handling.context("left").fibre = HeldFibre(number=1, reach=candidate, held=True)
+    assert found.next_request() is not None
+    qtbot.mouseClick(tasks(window).tool.choices["left"], LEFT)
+    width = window.findChild(QuantityField, "gripperWidth")
+    assert width is not None
+    Hand(window, qtbot).enter(width, "150")
+    qtbot.keyClick(width, Qt.Key.Key_Return)
+    card = found.card
+    qtbot.waitUntil(lambda: "were opened" in card.line.text())
+    assert card.badge.word == "IN DOUBT"
+    assert "whether they still hold fibre 1 is not known" in card.line.text()
+    assert card.next.isVisible()
+    assert card.next.text() == "Put away"
+    assert not card.undo.isVisible()
+    assert (found.handling.held_by, found.handling.may_hold) == ("", "left")
+    menu = Hand(window, qtbot).menu_at((10.0, 10.0))
+    assert not menu["Bring to the probe"].isEnabled()
+    assert menu["Put away"].isEnabled()
 
 
 def take(window: OperatorWindow, qtbot: QtBot) -> OperationCard:

@@ -16,6 +16,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.garbage import GARBAGE
 from cosmic.frame.threads import running_threads
 from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.news import AxisBegun
 from cosmic.mico.gui.mico_widget import MicoWidget, make_mico_gui
 from gui.app.windows import Make, mico
 from gui.mico.panels import click, enter, field, part, position, wait_for_position
@@ -185,14 +186,25 @@ def test_closing_while_initialising_ends_in_time(make: Make, qtbot: QtBot) -> No
     assert not running_threads()
 
 
+def movements(panel: MicoWidget) -> list[str]:
+    """Return a list that takes who commanded each movement from now on."""
+    told: list[str] = []
+    panel.mico.follow_movements(
+        lambda news: told.append(news.source) if isinstance(news, AxisBegun) else None
+    )
+    return told
+
+
 def test_the_console_moves_the_same_platform(make: Make, qtbot: QtBot) -> None:
     window = make(console=True, hardware=False)
     panel = ready(window, qtbot)
     console = window.console
     assert console is not None
+    told = movements(panel)
     console.run('rig.mico["left.x"].move_to("0.1 mm")')
     wait_for_position(qtbot, panel.cards["left.x"], 100.0)
     qtbot.waitUntil(lambda: "100" in console.text() or "99." in console.text())
+    assert told == ["console"]
     console.run("cosmic.__version__")
     qtbot.waitUntil(lambda: "0.1" in console.text())
 

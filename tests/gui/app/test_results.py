@@ -8,8 +8,10 @@ import time
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
@@ -143,6 +145,63 @@ def test_the_cursors_bound_what_is_fitted(
     assert f"difference {SLOPE:.2f}"[:14] in panel.viewer.slope.text()
     where, _ = panel.viewer.curves.between()
     assert (where.min(), where.max()) == (1.0, 2.0)
+
+
+def draw_over(panel: ResultsPanel, across: str) -> None:
+    """Choose what lies along the horizontal axis."""
+    panel.viewer.across.setCurrentText(across)
+    panel.viewer.across.activated.emit(panel.viewer.across.currentIndex())
+
+
+def test_force_over_position_is_that_of_the_time_between_the_cursors(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "push.h5")
+    write_force(tmp_path / "other.h5")
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    curves = panel.viewer.curves
+    curves.cursors.setRegion((1.0, 2.0))
+    draw_over(panel, "left.x")
+    (line,) = curves.lines
+    assert (line[2].min(), line[2].max()) == pytest.approx((501.0, 502.0), abs=0.1)
+    assert curves.region == pytest.approx((501.0, 502.0), abs=0.1)
+    field = next(each for each in shown_items(panel, pg.ViewBox) if each.height() > 10.0)
+    low, high = field.viewRange()[0]
+    assert 500.0 < low < 501.1
+    assert 501.9 < high < 503.0
+    draw_over(panel, "time")
+    assert curves.region == pytest.approx((1.0, 2.0))
+    draw_over(panel, "left.x")
+    choose(panel, qtbot, "other")
+    (line,) = curves.lines
+    assert (line[2].min(), line[2].max()) == pytest.approx((500.0, 504.0), abs=0.1)
+
+
+def shown_items(panel: ResultsPanel, kind: type[Any]) -> list[Any]:
+    """Return what is drawn with the curves, from above."""
+    view = panel.viewer.curves.findChild(pg.GraphicsView)
+    assert view is not None
+    found = [each for each in view.scene().items() if isinstance(each, kind) and each.isVisible()]
+    return sorted(found, key=lambda each: each.sceneBoundingRect().top())
+
+
+@pytest.mark.parametrize("share", [1000, 10])
+def test_the_names_of_the_axes_beside_low_curves_do_not_run_into_each_other(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path, share: int
+) -> None:
+    write_force(tmp_path / "push.h5")
+    write_images(tmp_path / "film")
+    panel.resize(1016, 460)
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    panel.viewer.split.setSizes([1000, share])
+    qtbot.wait(50)
+    axes = [each for each in shown_items(panel, pg.AxisItem) if each.orientation == "left"]
+    names = [each.label.sceneBoundingRect() for each in axes]
+    assert len(names) == 2
+    assert names[0].bottom() <= names[1].top() + 1.0
+    assert all(each.label.toPlainText().strip() for each in axes)
 
 
 def test_image_force_position_and_log_go_together(

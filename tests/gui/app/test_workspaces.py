@@ -32,6 +32,8 @@ from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.limit_indicator import LimitIndicator
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.stop_button import StopButton
+from cosmic.mico.core.sequence.report import StepState
+from cosmic.mico.gui.initialisation_panel import InitialisationPanel
 from cosmic.vico.api.vico import vico_of
 from cosmic.vico.core.calibration import Plane
 from cosmic.vico.core.calibration_fit import Sighting, fit_map
@@ -494,6 +496,25 @@ def test_a_stop_is_shown_beside_the_tool_and_the_coach_resets_it(
     assert "STOPPED" not in tasks(whole).tool.line.text()
 
 
+def test_after_a_stop_in_its_middle_the_coach_asks_to_initialise_again(
+    own: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(own, qtbot, SET_UP)
+    coach = own.findChild(QWidget, "coach")
+    words, button = part(coach, "coachWords", QLabel), part(coach, "coachButton", QPushButton)
+    qtbot.waitUntil(lambda: "All axes are ready" in words.text(), timeout=30_000)
+    panel = part(own, "initialisationPanel", InitialisationPanel)
+    panel.start_anyway()
+    qtbot.waitUntil(lambda: any(e.state is StepState.RUNNING for e in panel.report.steps))
+    qtbot.waitUntil(lambda: "being initialised" in words.text())
+    own.stop("a hand on the button")
+    qtbot.waitUntil(lambda: any(e.state is StepState.FAILED for e in panel.report.steps))
+    qtbot.waitUntil(lambda: button.text() == "Reset")
+    qtbot.mouseClick(button, LEFT)
+    qtbot.waitUntil(lambda: "initialisation ended early" in words.text())
+    assert button.text() == "Initialise"
+
+
 def test_the_coach_says_what_a_calibration_high_above_the_plate_is_not_good_for(
     whole: OperatorWindow, qtbot: QtBot
 ) -> None:
@@ -511,7 +532,7 @@ def test_the_coach_says_what_a_calibration_high_above_the_plate_is_not_good_for(
     plane = Plane(zoom, 1500.0, fit_map(seen), datetime.now(UTC))
     transform.calibrations.add_plane(camera.name, "left", plane)
     qtbot.waitUntil(lambda: "Not calibrated for what lies on the plate" in words.text())
-    assert "height 0 um lies outside what was measured (1500 um)" in words.text()
+    assert "height 0 µm lies outside what was measured (1500 µm)" in words.text()
     assert "Bring a tool down" in words.text()
 
 

@@ -54,6 +54,17 @@ def test_old_and_new_records_are_shown_once_newest_last(
     qtbot.waitUntil(lambda: ends(panel) == ["before the window", "first", "second"])
 
 
+def test_units_are_read_with_a_micro_sign_and_found_without(
+    qtbot: QtBot, panel: LogPanel, log: logging.Logger
+) -> None:
+    log.info("left X: jog right, 200 um/s")
+    log.info("force: its limit is %g uN", 140.0)
+    said = ["left X: jog right, 200 µm/s", "force: its limit is 140 µN"]
+    qtbot.waitUntil(lambda: ends(panel)[1:] == said)
+    panel.set_search("140 uN")
+    assert ends(panel) == said[1:]
+
+
 def test_the_level_and_the_text_narrow_what_is_shown(
     qtbot: QtBot, panel: LogPanel, log: logging.Logger
 ) -> None:

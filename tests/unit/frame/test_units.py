@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosmic.frame.errors import QuantityError
-from cosmic.frame.units import DISPLAY, format_quantity, parse_quantity
+from cosmic.frame.units import DISPLAY, format_quantity, parse_quantity, with_micro_signs
 
 UNITS = ["um", "deg", "V", "Hz", "steps"]
 numbers = st.floats(min_value=-1e9, max_value=1e9)
@@ -116,3 +116,16 @@ def test_a_quantity_is_shown_with_the_digits_of_its_unit(
 
 def test_every_unit_that_is_read_is_shown() -> None:
     assert set(DISPLAY) == set(UNITS)
+
+
+@pytest.mark.parametrize(
+    ("written", "read"),
+    [
+        ("left X: jog right, 200 um/s, by key", "left X: jog right, 200 µm/s, by key"),
+        ("-150 to 150 uN", "-150 to 150 µN"),
+        ("(1500 um), 3uN/um at 2 uV", "(1500 µm), 3µN/µm at 2 µV"),
+        ("position_um, 'um', sum, um_px", "position_um, 'um', sum, um_px"),
+    ],
+)
+def test_a_sentence_for_the_operator_has_micro_signs(written: str, read: str) -> None:
+    assert with_micro_signs(written) == read

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QSizePolicy, QVBoxLay
 from cosmic.frame.gui.build import named, push_button, styled, tight_row
 from cosmic.frame.gui.key_focus import set_shown
 from cosmic.frame.gui.theme import STEP_PX
+from cosmic.frame.units import with_micro_signs
 
 MOST_LINES: Final = 7
 LOOK_MS: Final = 400
@@ -100,14 +101,14 @@ class Coach(QFrame):
 
     def _show(self, step: Step | None) -> None:
         self._step = step
-        text = step.text if step is not None else ""
+        text = with_micro_signs(step.text) if step is not None else ""
         if self.words.text() != text:
             self.words.setText(text)
             self.words.setToolTip(text)
         set_shown(self.button, self, shown=step is not None and bool(step.button))
         if step is not None and self.button.text() != step.button:
             self.button.setText(step.button)
-            self.button.setToolTip(step.text)
+            self.button.setToolTip(text)
 
     def _on_pressed(self) -> None:
         if self._step is not None and self._step.act is not None:

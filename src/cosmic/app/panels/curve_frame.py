@@ -4,6 +4,7 @@ from abc import abstractmethod
 
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent
+from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from cosmic.frame.gui.palette import Palette
@@ -11,6 +12,7 @@ from cosmic.frame.gui.theme import current_palette, number_font
 from cosmic.frame.overrides import override
 
 _GAP_PX = 2
+_AROUND_PX = 8
 
 
 class CurveFrame(QWidget):
@@ -30,6 +32,7 @@ class CurveFrame(QWidget):
         super().__init__(parent)
         self._axis_px = axis_px
         self._boxes: list[pg.ViewBox] = []
+        self._beside: list[pg.AxisItem] = []
         self._names: dict[pg.AxisItem, str] = {}
         self._view = pg.GraphicsView()
         self._layout = pg.GraphicsLayout()
@@ -45,8 +48,10 @@ class CurveFrame(QWidget):
         row = len(self._boxes)
         box = pg.ViewBox(enableMenu=False, enableMouse=False)
         self._boxes.append(box)
+        box.sigResized.connect(self._on_field_resized)
         axis = self._axis("left", name, box)
         axis.setWidth(self._axis_px)
+        self._beside.append(axis)
         self._layout.addItem(axis, row=row, col=0)
         self._layout.addItem(box, row=row, col=1)
         self._layout.layout.setRowStretchFactor(row, share)
@@ -77,7 +82,27 @@ class CurveFrame(QWidget):
             axis.setTextPen(palette.text)
             axis.setStyle(tickFont=number_font(11), tickLength=4)
             axis.setLabel(name, color=palette.dim)
+        self._fit_names()
         self._colour(palette)
+
+    def _on_field_resized(self, _box: object) -> None:
+        if self._complete:
+            self._fit_names()
+
+    def _fit_names(self) -> None:
+        """Shorten names that are longer than their field is high: to the unit, or to nothing."""
+        for box, axis in zip(self._boxes, self._beside, strict=True):
+            name = self._names[axis]
+            metrics = QFontMetricsF(axis.label.font())
+            fitting = (
+                each
+                for each in (name, name.rpartition(", ")[2])
+                if metrics.horizontalAdvance(each) + _AROUND_PX <= box.height()
+            )
+            text = next(fitting, "")
+            axis.setToolTip(name)
+            if text != axis.labelText:
+                axis.setLabel(text, color=current_palette().dim)
 
     @abstractmethod
     def _colour(self, palette: Palette) -> None:

@@ -21,6 +21,7 @@ from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.key_focus import set_shown
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font
+from cosmic.frame.units import with_micro_signs
 
 if TYPE_CHECKING:
     from cosmic.autonomy.handling.context import HandlingContext
@@ -151,7 +152,7 @@ class OperationCard(QFrame):
         self._look.stop()
         self.title.set_text(result.title)
         self._show_outcome(result)
-        self.line.setText(result.text)
+        self.line.setText(with_micro_signs(result.text))
         self._show_values(result.values)
         self._fit()
 
@@ -170,7 +171,7 @@ class OperationCard(QFrame):
         self._look.stop()
         self.title.set_text(title)
         self.badge.set_state(State.REFUSED)
-        self.line.setText(why)
+        self.line.setText(with_micro_signs(why))
         self._show_values(())
         self._fit()
 
@@ -204,7 +205,7 @@ class OperationCard(QFrame):
         ending = run.state is RunState.ABORTING
         self.badge.set_state(State.BUSY)
         view = run.tree
-        self.line.setText("ending, and making safe" if ending else at_work(view))
+        self.line.setText("ending, and making safe" if ending else with_micro_signs(at_work(view)))
         self.progress.setValue(round(100 * share_done(view)))
         if ending and self.stop.hasFocus():
             self.setFocus()

@@ -24,11 +24,16 @@ def what_is_lost(rig: Rig, operations: FibreOperations | None, *, force: bool) -
     if running := rig.running:
         later = " Resume goes on with it another time." if running == A_CAMPAIGN else ""
         found.append(f"{running[:1].upper()}{running[1:]} is running: it is aborted.{later}")
-    held_by = operations.handling.held_by if operations is not None and operations.used else ""
-    if held_by:
+    handling = operations.handling if operations is not None and operations.used else None
+    if handling is not None and handling.may_hold:
         found.append(
-            f"The {held_by} gripper holds a fibre: it stays in the jaws, and nothing knows of it "
-            "at the next start. Put it away first."
+            f"The {handling.may_hold} gripper was opened since it took a fibre and may still hold "
+            "it: nothing knows of it at the next start. Put it away first."
+        )
+    if handling is not None and handling.held_by:
+        found.append(
+            f"The {handling.held_by} gripper holds a fibre: it stays in the jaws, and nothing "
+            "knows of it at the next start. Put it away first."
         )
     if force:
         try:

@@ -14,6 +14,7 @@ from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.mico.core.motion.positioner import Confidence
+from cosmic.mico.core.sequence.report import StepState
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.hw.interface import PositionerKind
 from cosmic.vico.hw.peripherals import LensAxis
@@ -42,6 +43,7 @@ def coach_rules(
     rules = _Rules(window, rig, gui, parts, campaign)
     first = (rules.not_ready, rules.stopped, rules.limit_crossed, rules.campaign)
     missing = (
+        rules.initialising,
         rules.position_unknown,
         rules.lens_unknown,
         rules.camera_stopped,
@@ -101,6 +103,13 @@ class _Rules:
         name = crossed.settings.channel
         text = f"The {name} crossed its limit. Move the tool off, then reset the limit."
         return Step(text, "Reset limit", self._try(lambda: daqco.reset_limit(name)))
+
+    def initialising(self) -> Step | None:
+        """Look whether the axes are just driven to their references."""
+        steps = self._gui.mico.initialisation.steps
+        if all(each.state is not StepState.RUNNING for each in steps):
+            return None
+        return Step("The axes are being initialised. STOP ends it at once.")
 
     def position_unknown(self) -> Step | None:
         """Look at what is known of the positions."""
@@ -174,8 +183,13 @@ class _Rules:
             return Step("The operation runs; its card is on the image. Escape or STOP stops it.")
         request = operations.next_request()
         if request is not None:
-            holder = operations.handling.held_by
-            text = f"The {holder} gripper holds a fibre. {request.title} comes next."
+            handling = operations.handling
+            text = f"The {handling.held_by} gripper holds a fibre. {request.title} comes next."
+            if handling.may_hold:
+                text = (
+                    f"The {handling.may_hold} gripper was opened since it took the fibre: whether "
+                    "it still holds it is not known. Put away looks at the jaws."
+                )
             return Step(text, request.title, lambda: operations.begin(request))
         if spaces.current != "Handle":
             return None
@@ -235,6 +249,14 @@ class _Rules:
         return go
 
     def _set_up(self) -> Step:
+        steps = self._gui.mico.initialisation.steps
+        failed = next((each for each in steps if each.state is StepState.FAILED), None)
+        if failed is not None:
+            text = (
+                f'The initialisation ended early, at "{failed.title}": not every axis is ready. '
+                "Look at the tools, then initialise again."
+            )
+            return Step(text, "Initialise", self._gui.initialise)
         return Step("All axes are ready. Look at the plate next.", "Look", self._go("Look"))
 
     def _look(self) -> Step:

@@ -277,12 +277,14 @@ class FibreOperations(QObject):
 
     def next_request(self) -> "OperationRequest | None":
         """Return the operation that usually comes next; None where none does, or one runs."""
-        if not self.used or self.running or not self.handling.held_by:
+        if not self.used or self.running:
+            return None
+        if not self.handling.held_by and not self.handling.may_hold:
             return None
         from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
 
         pushed = self.handling.last in (SingleOperation.PUSH, SingleOperation.MEASURE)
-        if pushed:
+        if pushed or self.handling.may_hold:
             return OperationRequest(SingleOperation.PUT_AWAY)
         if self.handling.at_probe:
             return OperationRequest(SingleOperation.PUSH, force_un=self.card.force.value())

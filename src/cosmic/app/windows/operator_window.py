@@ -48,7 +48,6 @@ from cosmic.frame.gui.stop_key import StopKeyFilter
 from cosmic.frame.gui.theme import State
 from cosmic.frame.log import RingBufferHandler
 from cosmic.frame.overrides import override
-from cosmic.mico.api.mico import mico_of
 from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.mico.gui.mico_widget import MicoWidget
 
@@ -106,8 +105,8 @@ class OperatorWindow(CosmicServerGui):
         super().__init__(settings, stop_key=stop_key, theme=theme)
         self.setWindowTitle(f"CoSMic: {platform.file.platform.name}")
         self._platform, self._host = platform, host
-        self._rig = Rig(platform, source="console")
-        self._mico = None if platform.mico is None else mico_of(platform.mico, "window")
+        self._rig = Rig(platform, source="window")
+        self._mico = None if platform.mico is None else self._rig.mico
         self._console: ConsolePanel | None = None
         self._procedures: ProcedurePanels | None = None
         self._mico_gui: MicoWidget | None = None
@@ -226,7 +225,7 @@ class OperatorWindow(CosmicServerGui):
         )
         self._campaign.replayed.connect(self._raise_scene)
         if self._host is not None:
-            self._host.use_rig(self._rig)
+            self._host.use_rig(self._rig.commanding_as("station"))
         self._calibrations = add_calibrations(self, self._rig, beside=MICO)
         self.dock(MICO).raise_()
 
@@ -266,7 +265,7 @@ class OperatorWindow(CosmicServerGui):
         if console:
             self._console = ConsolePanel(
                 self._platform.policy,
-                {"rig": self._rig, "cosmic": cosmic},
+                {"rig": self._rig.commanding_as("console"), "cosmic": cosmic},
                 on_interrupt=self.halt_all,
                 banner='Python console: try rig.mico["left.x"].move_by("0.2 mm"). '
                 "Ctrl+C or Interrupt breaks what runs.\n",

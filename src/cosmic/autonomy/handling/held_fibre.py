@@ -41,6 +41,10 @@ class HeldFibre:
         It left the probe as it was slid up and down: that is not done again.
     stuck : bool
         It could not be put away.
+    closed_at_um : float
+        What was counted as the opening when the jaws had closed around it.
+    doubted : bool
+        The jaws were opened since, by no operation: whether it is still held is not known.
     standard : bool
         It is the standard: it is put back where it lay.
     measured : MeasuredFibre or None
@@ -78,7 +82,18 @@ class HeldFibre:
     probe_until_s: float | None = None
     slid_off: bool = False
     stuck: bool = False
+    closed_at_um: float = 0.0
+    doubted: bool = False
     standard: bool = False
+
+    def opened_um(self, counted_um: float) -> float:
+        """Return how far the jaws are open since they had closed around it."""
+        return max(0.0, counted_um - self.closed_at_um)
+
+    def note_opening(self, counted_um: float) -> None:
+        """Doubt that it is held once the jaws were opened by more than it is wide."""
+        if self.held and not self.opened_um(counted_um) <= self.width_um:
+            self.doubted = True
 
     @property
     def length_um(self) -> float:

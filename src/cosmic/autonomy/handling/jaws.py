@@ -46,6 +46,12 @@ def note_gap(work: HandlingContext, gap_um: float, std_um: float) -> None:
     _set_estimate(work, gap_um, std_um)
 
 
+def note_closed(work: HandlingContext) -> None:
+    """Remember at what count the jaws are closed around the fibre: from there they open."""
+    if work.fibre is not None:
+        work.fibre.closed_at_um = work.mico[work.gripper.gap_axis].position_um or 0.0
+
+
 def _set_estimate(work: HandlingContext, gap_um: float, std_um: float | None) -> None:
     axis = work.mico[work.gripper.gap_axis]
     try:

@@ -88,7 +88,7 @@ def see_released(work: HandlingContext) -> Steps:
     image = yield work.image()
     assert isinstance(image, CameraImage)
     if _hangs(work, fibre, image):
-        fibre.looks += 1
+        fibre.looks, fibre.doubted = fibre.looks + 1, False
         failure = OperationFailed(ADHESION, f"fibre {fibre.number} still sticks to the jaws")
         work.failures.append((Release.name, failure))
         raise failure

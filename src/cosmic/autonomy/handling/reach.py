@@ -7,7 +7,7 @@ from typing_extensions import override
 
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.held_fibre import HeldFibre
-from cosmic.autonomy.handling.jaws import move_jaws, note_gap
+from cosmic.autonomy.handling.jaws import move_jaws, note_closed, note_gap
 from cosmic.autonomy.handling.plate import along, arc_lengths
 from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen, trace_along
 from cosmic.autonomy.handling.tips import see_tip
@@ -203,6 +203,7 @@ class CloseJaws(FibreOperation):
         gap = work.gap_um if work.gap_um is not None else work.settings.grasp.gap_um
         yield from move_jaws(work, -(gap + work.settings.grasp.closing_um))
         work.gap_um = 0.0
+        note_closed(work)
         work.held_fibre().tries += 1
 
     @override

@@ -16,7 +16,7 @@ from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.force_limit import arm_force_limit, put_back
 from cosmic.autonomy.handling.grasp import in_jaws, seen_at, shape_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
-from cosmic.autonomy.handling.jaws import move_jaws, note_gap
+from cosmic.autonomy.handling.jaws import move_jaws, note_closed, note_gap
 from cosmic.autonomy.handling.plate import along
 from cosmic.autonomy.handling.prepare import retract_probe, zoom_to
 from cosmic.autonomy.handling.push import (
@@ -268,8 +268,10 @@ class CloseGently(FibreOperation):
                 continue
             if abs(force_un - base_un) > GENTLE_TIMES * work.settings.push.contact_un:
                 self.felt_un = force_un - base_un
+                note_closed(work)
                 return
         note_gap(work, 0.0, HELD_STD_UM)
+        note_closed(work)
 
     @staticmethod
     def _force_un(work: HandlingContext) -> Generator[Yielded, object, float | None]:

@@ -172,6 +172,8 @@ class Opening(_OneStep):
         if here is None:
             raise OperationFailed("opening unknown", "initialise the platform")
         yield from move_jaws(work, step.opening_um - here)
+        if work.fibre is not None:
+            work.fibre.note_opening(step.opening_um)
         yield SAFE_POINT
 
 

@@ -3,7 +3,7 @@
 import logging
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from threading import RLock
 from typing import Final, Protocol, get_args
@@ -34,11 +34,13 @@ from cosmic.autonomy.shipped.single import (
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.events import Event, Unsubscribe
 from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.news import AxisEnded, MovementNews
 from cosmic.mico.core.motion.positioner import positions_of
 
 logger = logging.getLogger(__name__)
 
 USUAL_FORCE_UN: Final = 50.0
+IN_DOUBT: Final = "in doubt"
 ENDED: Final = "ended"
 """What an operation is called that whoever watched over it has ended."""
 GRIPPERS: Final[tuple[str, ...]] = get_args(HandlingSettings.model_fields["gripper"].annotation)
@@ -104,7 +106,8 @@ class OperationResult:
     values : tuple of (str, str)
         What was measured: a name, and the value with its 95 % interval and unit.
     interrupted : str
-        "stopped" by the stop, or "ended" by whoever watched over it; empty where it was neither.
+        "stopped" by the stop, "ended" by whoever watched over it, or "in doubt" where the jaws were
+        opened by no operation; empty where it was none of them.
     """
 
     title: str
@@ -139,6 +142,20 @@ class MakeRun(Protocol):
         """Return it."""
 
 
+@dataclass(slots=True, eq=False)
+class HandlingState:
+    """What all who handle fibres on one platform share."""
+
+    contexts: dict[str, HandlingContext] = field(default_factory=dict)
+    lock: RLock = field(default_factory=RLock)
+    gripper: str = ""
+    done: list[SingleOperation] = field(default_factory=list)
+    run: ProcedureRun[HandlingContext] | None = None
+    result: OperationResult | None = None
+    request: OperationRequest | None = None
+    changed: Event[[]] = field(default_factory=Event)
+
+
 class FibreHandling:
     """One fibre at a time, handled by single operations; any thread.
 
@@ -155,6 +172,8 @@ class FibreHandling:
         Returns what else runs on the platform, in words; empty for nothing.
     settings : HandlingSettings or None
         Of all operations; gripper and other are set by what is asked for.
+    state : HandlingState or None
+        That of another with which it shares everything; None: its own.
 
     Raises
     ------
@@ -168,23 +187,24 @@ class FibreHandling:
         make_run: MakeRun,
         busy: Callable[[], str],
         settings: HandlingSettings | None = None,
+        state: HandlingState | None = None,
     ) -> None:
         self._rig, self._make_run, self._busy = rig, make_run, busy
         self._settings = settings or HandlingSettings()
         tools = {each.name: each for each in vision_of(rig.vico).settings.tool}
         self._grippers = tuple(name for name in GRIPPERS if name in tools and tools[name].gap_axis)
-        self._contexts: dict[str, HandlingContext] = {}
-        self._lock = RLock()
-        self._gripper = ""
-        self._done: list[SingleOperation] = []
-        self._run: ProcedureRun[HandlingContext] | None = None
-        self._result: OperationResult | None = None
-        self._request: OperationRequest | None = None
-        self._changed: Event[[]] = Event()
+        self._state = state or HandlingState()
+        self._forget_movements: Callable[[], None] = _nothing
+        if state is None:
+            self._forget_movements = rig.mico.follow_movements(self._on_movement)
 
     @override
     def __repr__(self) -> str:
         return f"<FibreHandling, {self.held_by or 'no gripper'} holds a fibre>"
+
+    def commanding_by(self, rig: Applications) -> "FibreHandling":
+        """Return the same, whose operations move axes by the name that `rig` commands by."""
+        return FibreHandling(rig, self._make_run, self._busy, self._settings, self._state)
 
     # What is known
 
@@ -196,35 +216,46 @@ class FibreHandling:
     @property
     def run(self) -> ProcedureRun[HandlingContext] | None:
         """The operation begun last; None before the first."""
-        return self._run
+        return self._state.run
 
     @property
     def request(self) -> OperationRequest | None:
         """What was asked for last; None before the first, and after a recorded procedure."""
-        return self._request
+        return self._state.request
 
     @property
     def running(self) -> bool:
         """True while an operation runs."""
-        run = self._run
+        run = self._state.run
         return run is not None and not run.over and run.state is not RunState.READY
 
     @property
     def result(self) -> OperationResult | None:
         """How the operation before ended; None before the first has."""
-        return self._result
+        return self._state.result
 
     @property
     def fibre(self) -> HeldFibre | None:
-        """The fibre that is held, with all that became known of it."""
-        work = self._contexts.get(self._gripper)
-        fibre = work.fibre if work is not None else None
-        return fibre if fibre is not None and fibre.held else None
+        """The fibre that is held, with all that became known of it; None also where in doubt."""
+        carried = self._carried
+        return carried if carried is not None and not carried.doubted else None
 
     @property
     def held_by(self) -> str:
-        """Which gripper holds a fibre; empty for none."""
-        return self._gripper if self.fibre is not None else ""
+        """Which gripper holds a fibre; empty for none, and where that is in doubt."""
+        return self._state.gripper if self.fibre is not None else ""
+
+    @property
+    def may_hold(self) -> str:
+        """Which gripper was opened, by no operation, since it took a fibre; empty for none."""
+        return self._state.gripper if self._carried is not None and self.fibre is None else ""
+
+    @property
+    def _carried(self) -> HeldFibre | None:
+        """The fibre that was taken and not put away since."""
+        work = self._state.contexts.get(self._state.gripper)
+        fibre = work.fibre if work is not None else None
+        return fibre if fibre is not None and fibre.held else None
 
     @property
     def at_probe(self) -> bool:
@@ -232,25 +263,25 @@ class FibreHandling:
         if self.fibre is None:
             return False
         try:
-            return is_at_probe(self._contexts[self._gripper])
+            return is_at_probe(self._state.contexts[self._state.gripper])
         except NotAvailable:
             return False
 
     @property
     def last(self) -> SingleOperation | None:
         """What Undo would take back; None where there is nothing."""
-        return self._done[-1] if self._done else None
+        return self._state.done[-1] if self._state.done else None
 
     def subscribe(self, listener: Callable[[], object]) -> Unsubscribe:
-        """Call `listener()` when an operation has begun or ended, in any thread."""
-        return self._changed.subscribe(listener)
+        """Call `listener()` when an operation began or ended, or a fibre is doubted; any thread."""
+        return self._state.changed.subscribe(listener)
 
     # What can be done
 
     def why_not(self, request: OperationRequest) -> str:
         """Return why an operation cannot begin now; empty where it can. Nothing moves."""
-        if self.running and self._run is not None:
-            return f"{self._run.name} is running; wait until it has ended, or stop it"
+        if self.running and self._state.run is not None:
+            return f"{self._state.run.name} is running; wait until it has ended, or stop it"
         if other := self._busy():
             return f"{other} is running; end it first"
         if stopped := self._rig.mico.stop_state.reason:
@@ -259,10 +290,15 @@ class FibreHandling:
             return self._why_not_take(request)
         if request.operation is SingleOperation.CLOSE:
             return self._why_no_gripper(request)
-        if self.fibre is None:
+        return self._why_not_held(request)
+
+    def _why_not_held(self, request: OperationRequest) -> str:
+        if self._carried is None:
             return "no gripper holds a fibre; take one first"
+        if request.operation is not SingleOperation.PUT_AWAY and (doubt := self._doubt()):
+            return f"{doubt}; put it away first"
         if request.operation is SingleOperation.UNDO:
-            return "" if self._done else "there is nothing to undo"
+            return "" if self._state.done else "there is nothing to undo"
         most = self._settings.push.limit_un
         if request.operation is SingleOperation.PUSH and not 0.0 < request.force_un <= most:
             return f"{request.force_un:g} µN is not between 0 and {most:g} µN"
@@ -273,9 +309,17 @@ class FibreHandling:
     def _why_not_take(self, request: OperationRequest) -> str:
         if request.marked is None:
             return "no fibre is marked; find the fibres, and choose one in the image"
+        if doubt := self._doubt():
+            return f"{doubt}; put it away first"
         if self.fibre is not None:
-            return f"{self._gripper} holds a fibre; put it away first"
+            return f"{self._state.gripper} holds a fibre; put it away first"
         return self._why_no_gripper(request) or self._why_not_at_zoom(request, request.marked)
+
+    def _doubt(self) -> str:
+        """Return what is not known of the fibre that was taken, or nothing."""
+        if not self.may_hold:
+            return ""
+        return f"{self._state.gripper} was opened since it took a fibre, and may hold it or not"
 
     def _why_not_at_zoom(self, request: OperationRequest, marked: MarkedFibre) -> str:
         """Return why a fibre cannot be found again from the zoom of its image, or nothing.
@@ -298,7 +342,7 @@ class FibreHandling:
 
     def _measured_at(self, gripper: str, marked: MarkedFibre) -> bool:
         """Tell whether the image of a fibre can be told as positions already."""
-        work = self._contexts.get(gripper)
+        work = self._state.contexts.get(gripper)
         if work is None:
             return False
         try:
@@ -321,7 +365,7 @@ class FibreHandling:
             return self._preview_take(request.gripper, request.marked)
         if request.operation is SingleOperation.CLOSE:
             return OperationPreview(f"The jaws of {request.gripper} close slowly until they hold.")
-        work = self._contexts[self._gripper]
+        work = self._state.contexts[self._state.gripper]
         positions = work.settings.places
         now = positions_of(work.mico.states())
         away = {work.probe.y_axis: positions.probe_away_y_um - work.probe.tip_um[1]}
@@ -340,7 +384,7 @@ class FibreHandling:
                 (now, now | away, now | away | there),
             )
         if request.operation is SingleOperation.UNDO:
-            return OperationPreview(UNDO_WORDS[self._done[-1]], (now, now | away))
+            return OperationPreview(UNDO_WORDS[self._state.done[-1]], (now, now | away))
         words = (
             f"The probe pushes the fibre until it pushes back with {request.force_un:g} µN, and "
             "goes back."
@@ -378,20 +422,21 @@ class FibreHandling:
         ConfigError
             The platform has no such tool, camera or force channel.
         """
-        with self._lock:
+        with self._state.lock:
             if why := self.why_not(request):
                 raise NotAvailable(f"{request.title}: {why}")
             taking = request.operation is SingleOperation.TAKE
             own = taking or request.operation is SingleOperation.CLOSE
-            work = self.context(request.gripper if own else self._gripper)
+            work = self.context(request.gripper if own else self._state.gripper)
+            work.mico = self._rig.mico
             push, closing = PushToForce(request.force_un), CloseGently()
             procedure = self._procedure(request, work, push, closing)
             if taking:
-                self._gripper, self._done = request.gripper, []
+                self._state.gripper, self._state.done = request.gripper, []
                 work.shared.surveyed = False
-            self._request = request
+            self._state.request, doubted = request, bool(self.may_hold)
             return self._made(
-                procedure, work, lambda run: self._on_end(request, run, push, closing)
+                procedure, work, lambda run: self._on_end(request, run, push, closing, doubted)
             )
 
     def prepare_recorded(
@@ -414,15 +459,18 @@ class FibreHandling:
         ConfigError
             There is no such gripper.
         """
-        with self._lock:
+        with self._state.lock:
             if self.running or self._busy():
                 what = self._busy() or "an operation"
                 raise NotAvailable(f"{procedure.name}: {what} is running; end it first")
-            if self.fibre is not None and gripper != self._gripper:
-                raise NotAvailable(f"{self._gripper} holds a fibre; put it away first")
+            if doubt := self._doubt():
+                raise NotAvailable(f"{procedure.name}: {doubt}; put it away first")
+            if self.fibre is not None and gripper != self._state.gripper:
+                raise NotAvailable(f"{self._state.gripper} holds a fibre; put it away first")
             work = self.context(gripper)
+            work.mico = self._rig.mico
             work.shared.surveyed = False
-            self._gripper, self._request = gripper, None
+            self._state.gripper, self._state.request = gripper, None
             return self._made(procedure, work, lambda run: self._on_replayed(run, operations))
 
     def _made(
@@ -432,13 +480,13 @@ class FibreHandling:
         on_end: Callable[[ProcedureRun[HandlingContext]], None],
     ) -> ProcedureRun[HandlingContext]:
         """Return a run that is followed to its end."""
-        run = self._run = self._make_run(procedure, work)
+        run = self._state.run = self._make_run(procedure, work)
         done = False
 
         def look() -> None:
             nonlocal done
             if not run.over:
-                self._changed.emit()
+                self._state.changed.emit()
             elif not done:
                 done = True
                 on_end(run)
@@ -456,15 +504,15 @@ class FibreHandling:
         """
         if gripper not in self.grippers:
             raise ConfigError(f"there is no gripper {gripper!r}")
-        with self._lock:
-            if gripper not in self._contexts:
+        with self._state.lock:
+            if gripper not in self._state.contexts:
                 other = next((each for each in self.grippers if each != gripper), "")
                 settings = self._settings.model_copy(update={"gripper": gripper, "other": other})
                 work = HandlingContext.on(self._rig, settings)
-                if self._contexts:  # fibres are numbered through
-                    work.shared = next(iter(self._contexts.values())).shared
-                self._contexts[gripper] = work
-            return self._contexts[gripper]
+                if self._state.contexts:  # fibres are numbered through
+                    work.shared = next(iter(self._state.contexts.values())).shared
+                self._state.contexts[gripper] = work
+            return self._state.contexts[gripper]
 
     def _procedure(
         self,
@@ -481,7 +529,7 @@ class FibreHandling:
         if operation is SingleOperation.PUSH:
             return build_push(push)
         if operation is SingleOperation.UNDO:
-            return _UNDO[self._done[-1]]()
+            return _UNDO[self._state.done[-1]]()
         return _PLAIN[operation]()
 
     # How it ended
@@ -492,12 +540,15 @@ class FibreHandling:
         run: ProcedureRun[HandlingContext],
         push: PushToForce,
         closing: CloseGently,
+        doubted: bool,
     ) -> None:
         work = run.work
         work.shared.unsuitable = []
         if run.failure is None:
             closed = request.operation is SingleOperation.CLOSE
             values, text = _closed(work, closing) if closed else _found(request, work, push)
+            if doubted and work.fibre is None:
+                text = f"{work.settings.gripper} is empty; where the fibre came off is not known."
             result = OperationResult(request.title, good=True, text=text, values=values)
             self._note_done(request.operation)
         else:
@@ -526,11 +577,33 @@ class FibreHandling:
         advice = " Look at the tools, press Reset, then go on."
         return text + advice if interrupted == STOPPED else text
 
+    def _on_movement(self, news: MovementNews) -> None:
+        """See whether the jaws that hold a fibre were opened, by no operation; device threads."""
+        fibre, work = self._carried, self._state.contexts.get(self._state.gripper)
+        if not isinstance(news, AxisEnded) or fibre is None or work is None or self.running:
+            return
+        if news.name != work.gripper.gap_axis or news.position is None:
+            return
+        known = not fibre.doubted
+        fibre.note_opening(news.position)
+        work.gap_um = fibre.opened_um(news.position)
+        if known and fibre.doubted:
+            text = (
+                f"The jaws of {self._state.gripper} were opened: whether they still hold fibre "
+                f"{fibre.number} is not known. Put away opens them over the bin, and looks."
+            )
+            self._state.done = []
+            self._state.result = OperationResult(
+                "Jaws opened", good=False, text=text, interrupted=IN_DOUBT
+            )
+            logger.info("%s", text)
+            self._state.changed.emit()
+
     def _on_replayed(
         self, run: ProcedureRun[HandlingContext], operations: tuple[SingleOperation, ...]
     ) -> None:
         if run.failure is None:
-            self._done = []
+            self._state.done = []
             for each in operations:
                 self._note_done(each)
             text = "Every step was carried out."
@@ -546,28 +619,33 @@ class FibreHandling:
 
     def _end(self, result: OperationResult) -> None:
         if self.fibre is None:
-            self._done = []
-        self._result = result
+            self._state.done = []
+        self._state.result = result
         _forget_moves(self._rig)
         logger.info("%s: %s", result.title, result.text)
-        self._changed.emit()
+        self._state.changed.emit()
 
     def _note_done(self, operation: SingleOperation) -> None:
         if operation is SingleOperation.CLOSE:
             return
         if operation is SingleOperation.UNDO or (operation in PUSHES and self.last in PUSHES):
-            self._done.pop()  # several pushes are taken back as one: the probe goes away
+            self._state.done.pop()  # several pushes are taken back as one: the probe goes away
         if operation is not SingleOperation.UNDO:
-            self._done.append(operation)
+            self._state.done.append(operation)
 
     def close(self) -> None:
         """Abort what runs, and let go of the force channel; harmless the second time."""
-        run = self._run
+        self._forget_movements()
+        run = self._state.run
         if run is not None and self.running:
             run.abort("the platform is closed")
             run.join()
-        for work in self._contexts.values():
+        for work in self._state.contexts.values():
             work.close()
+
+
+def _nothing() -> None:
+    return None
 
 
 UNDO_WORDS: Final[Mapping[SingleOperation, str]] = {

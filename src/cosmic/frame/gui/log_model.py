@@ -19,6 +19,7 @@ from PySide6.QtGui import QColor
 from cosmic.frame.gui.palette import INK
 from cosmic.frame.gui.theme import State, current_palette, state_look
 from cosmic.frame.overrides import override
+from cosmic.frame.units import with_micro_signs
 
 Index = QModelIndex | QPersistentModelIndex
 Role = Qt.ItemDataRole
@@ -42,7 +43,7 @@ class LogEntry:
     @classmethod
     def of(cls, record: logging.LogRecord) -> "LogEntry":
         """Take what is shown out of `record`."""
-        text = record.getMessage()
+        text = with_micro_signs(record.getMessage())
         trace = record.exc_text or ""
         if record.exc_info and not trace:
             trace = _TRACE.formatException(record.exc_info)
@@ -144,7 +145,7 @@ class LogFilter(QSortFilterProxyModel):
 
     def set_text(self, text: str) -> None:
         """Show records that contain `text`, in any case of letters."""
-        self._text = text.casefold()
+        self._text = with_micro_signs(text).casefold()
         self.invalidate()
 
     @override

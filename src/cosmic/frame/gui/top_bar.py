@@ -32,6 +32,7 @@ from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.stop_button import StopButton
 from cosmic.frame.gui.theme import LARGE_PX, STEP_PX, State, current_palette, ui_font
+from cosmic.frame.units import with_micro_signs
 
 MODES: Final = {
     "MCM": "Manual control: you command every movement",
@@ -426,6 +427,7 @@ class TopBar(QWidget):
 
     def set_message(self, text: str, state: State = State.ERROR) -> None:
         """Show one line, such as the last error; empty takes it away."""
+        text = with_micro_signs(text)
         self._message_state.setVisible(bool(text))
         self._message_state.set_state(state, text)
         self._message.set_text(text)
@@ -433,7 +435,7 @@ class TopBar(QWidget):
     def set_latched(self, reason: str | None) -> None:
         """Turn the whole bar into the notice that the stop is latched; None ends that."""
         self._latched = reason is not None
-        words = f"■ STOPPED: {reason}" if reason else "■ STOPPED"
+        words = f"■ STOPPED: {with_micro_signs(reason)}" if reason else "■ STOPPED"
         self._latched_text.set_text(words, "■ STOPPED", "STOPPED")
         self._pages.setCurrentIndex(1 if self._latched else 0)
         if self.property("latched") == self._latched:

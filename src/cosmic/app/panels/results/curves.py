@@ -1,6 +1,7 @@
 """Curves of a recording over time or over a position, with two cursors and the moment shown."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -29,6 +30,8 @@ Line = tuple[str, str, Values, Values]
 class ResultCurves(CurveFrame):
     """Force above, positions below, or force over one position; GUI thread.
 
+    Over a position only that part is drawn which lay between the cursors when time was left.
+
     Signals
     -------
     moved()
@@ -54,12 +57,14 @@ class ResultCurves(CurveFrame):
         self._nows = [pg.InfiniteLine(angle=90, movable=True) for _ in range(2)]
         self._dot = pg.ScatterPlotItem(size=10)
         self._upper.addItem(self.cursors)
-        self._upper.addItem(self._dot)
+        self._upper.addItem(self._dot, ignoreBounds=True)
         for box, line in zip((self._upper, self._lower), self._nows, strict=True):
             line.sigDragged.connect(self._on_dragged)
-            box.addItem(line)
+            box.addItem(line, ignoreBounds=True)
             box.setMouseEnabled(x=False, y=False)
         self._unit, self._across = "", TIME
+        self._part_s: tuple[float, float] | None = None
+        self._path: Path | None = None
         self.cursors.hide()
         self._restyle()
         self._view.viewport().installEventFilter(self)
@@ -94,6 +99,7 @@ class ResultCurves(CurveFrame):
             self._upper.removeItem(flag)
         self._curves, self._flags, self._lines = [], [], []
         moved_to_another = across != self._across
+        self._choose_part(timelines[0].path if timelines else None, across)
         self._across = across
         for number, each in enumerate(timelines):
             self._add_force(each, channel, _COLOURS[number % len(_COLOURS)])
@@ -106,6 +112,18 @@ class ResultCurves(CurveFrame):
             self._place_cursors()
             self.show_all()
         self._restyle()
+
+    @property
+    def part_s(self) -> tuple[float, float] | None:
+        """Of which time force is drawn over a position, after the start; None: all of it."""
+        return self._part_s
+
+    def _choose_part(self, path: Path | None, across: str) -> None:
+        """Keep what the cursors chose over time; another recording is drawn as a whole."""
+        if path != self._path:
+            self._path, self._part_s = path, None
+        elif self._across == TIME != across and self.cursors.isVisible():
+            self._part_s = self.region
 
     def _add_force(self, timeline: Timeline, channel: str, colour: str) -> None:
         track = next((each for each in timeline.forces if each.name == channel), None)
@@ -121,6 +139,9 @@ class ResultCurves(CurveFrame):
             where = np.interp(track.time_s, axis.time_s, axis.values, left=np.nan, right=np.nan)
             what = track.values
             known = np.isfinite(where)
+            if self._part_s is not None:
+                after_s = track.time_s - timeline.start_s
+                known &= (self._part_s[0] <= after_s) & (after_s <= self._part_s[1])
             where, what = where[known], what[known]
             step = max(1, where.size // MOST_POINTS)
             drawn = where[::step], what[::step]
@@ -144,7 +165,8 @@ class ResultCurves(CurveFrame):
         self._layout.layout.setRowStretchFactor(1, 2 if shown else 0)
         self._layout.layout.setRowMaximumHeight(1, 10_000.0 if shown else 0.0)
         words = ", ".join(each.name for each in moved)
-        self._names[self._places] = f"{words}" if len(words) < 22 else f"{len(moved)} axes, µm"
+        words = words if len(words) < 22 else f"{len(moved)} axes"
+        self._names[self._places] = f"{words}, µm"
 
     def _draw(self, box: pg.ViewBox, colour: str, where: Values, what: Values) -> None:
         curve = pg.PlotCurveItem(where, what, connect="finite")
@@ -165,13 +187,17 @@ class ResultCurves(CurveFrame):
         self._names[self._left] = f"{channel}, {self._unit}" if channel else ""
         axis = next((each for each in timeline.positions if each.name == self._across), None)
         named = f"{axis.name}, {display_unit(axis.unit)}" if axis is not None else "time, s"
+        if axis is not None and self._part_s is not None:
+            named += f", from {self._part_s[0]:.2f} s to {self._part_s[1]:.2f} s"
         self._names[self._below] = named
 
     def _place_cursors(self) -> None:
-        """Put the cursors at a third and two thirds."""
+        """Put the cursors where they were over time, around a part, or at the thirds."""
         whole = self._extent()
         self.cursors.setVisible(whole is not None)
-        if whole is not None:
+        if whole is not None and self._part_s is not None:
+            self.cursors.setRegion(self._part_s if self._across == TIME else whole)
+        elif whole is not None:
             third = (whole[1] - whole[0]) / 3.0
             self.cursors.setRegion((whole[0] + third, whole[1] - third))
 

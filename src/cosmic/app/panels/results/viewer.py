@@ -32,6 +32,7 @@ from cosmic.frame.gui.build import named, push_button, styled, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.theme import STEP_PX, number_font
 from cosmic.frame.overrides import override
+from cosmic.frame.units import with_micro_signs
 from cosmic.mico.core.collision.model import SceneModel
 
 PLAY_MS: Final = 40
@@ -379,5 +380,7 @@ class ResultViewer(QWidget):
 def _happenings(timeline: Timeline) -> tuple[Happening, ...]:
     """Return marks and lines of the log in the order in which they came."""
     found = [Happening(each.time_s, each.kind, each.text) for each in timeline.marks]
-    found += [Happening(each.time_s, each.where, each.text) for each in timeline.log]
+    found += [
+        Happening(each.time_s, each.where, with_micro_signs(each.text)) for each in timeline.log
+    ]
     return tuple(sorted(found, key=lambda each: each.time_s))

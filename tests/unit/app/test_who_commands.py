@@ -1,0 +1,65 @@
+"""Who moved an axis: one rig by two names, whose runs keep out of each other's way."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import cosmic
+from cosmic.autonomy.recorded.operations import Surroundings
+from cosmic.autonomy.recorded.replay import replay_on
+from cosmic.autonomy.recorded.steps import MoveStep, RecordedProcedure, WaitForOperatorStep
+from cosmic.frame.errors import NotAvailable
+from cosmic.mico.api.news import AxisBegun
+
+AWAY = RecordedProcedure(name="away", step=[MoveStep(axes={"left.x": -50.0})])
+WAITING = RecordedProcedure(name="waiting", step=[WaitForOperatorStep(text="look")])
+BACK = RecordedProcedure(name="back", step=[MoveStep(axes={"left.x": 0.0})])
+
+
+def test_movements_are_told_by_the_name_of_whoever_commanded_them() -> None:
+    with cosmic.connect(rate=50.0) as rig:
+        console = rig.commanding_as("console")
+        sources: list[str] = []
+
+        def note(news: Any) -> None:
+            if isinstance(news, AxisBegun):
+                sources.append(news.source)
+
+        forget = rig.mico.follow_movements(note)
+        console.mico["left.y"].move_by(20.0)
+        rig.mico["left.y"].move_by(-20.0)
+        assert sources == ["console", "script"]
+        sources.clear()
+        replay_on(rig.handling, AWAY, Surroundings()).run_here()
+        assert set(sources) == {"script"}
+        sources.clear()
+        replay_on(console.handling, BACK, Surroundings()).run_here()
+        assert set(sources) == {"console"}
+        forget()
+
+
+def test_what_runs_by_one_name_runs_for_the_other_too(tmp_path: Path) -> None:
+    with cosmic.connect(rate=50.0) as rig:
+        console = rig.commanding_as("console")
+        assert console.control is rig.control
+        changes: list[str] = []
+        rig.handling.subscribe(lambda: changes.append(rig.running))
+        run = replay_on(console.handling, WAITING, Surroundings())
+        run.start()
+        assert rig.running == console.running == "waiting"
+        with pytest.raises(NotAvailable, match="is running"):
+            rig.campaign("bend-test", tmp_path)
+        with pytest.raises(NotAvailable, match="is running"):
+            replay_on(rig.handling, BACK, Surroundings())
+        run.abort("enough")
+        run.join()
+        assert "waiting" in changes
+        assert rig.handling.result is not None
+        assert rig.handling.result is console.handling.result
+
+
+def test_closing_by_one_name_closes_for_the_other() -> None:
+    with cosmic.connect(rate=50.0) as rig:
+        rig.commanding_as("console").close()
+        assert not rig.running
