@@ -71,7 +71,7 @@ class Rig:
         self._mico = mico_of(platform.mico, source) if platform.mico is not None else None
         self._daqco = daqco_of(platform.daqco) if platform.daqco is not None else None
         self._vico = vico_of(platform.vico) if platform.vico is not None else None
-        self._shared = shared or SharedRuns()
+        self._shared, self._first = shared or SharedRuns(), shared is None
         if self._mico is not None and shared is None:
             self._shared.control = Control(
                 self._mico,
@@ -85,7 +85,8 @@ class Rig:
     def commanding_as(self, source: str) -> "Rig":
         """Return the same rig, whose movements are logged by another name, such as "console".
 
-        What runs by one of them runs for the other too; closing one closes both.
+        What runs by one of them runs for the other too. The platform is closed by the first alone:
+        closing this one does nothing.
         """
         return Rig(self._platform, source, at_end=self._at_end, shared=self._shared)
 
@@ -447,9 +448,12 @@ class Rig:
         return scene.change_plate()
 
     def close(self) -> None:
-        """Stop everything, release the hold and end all threads; harmless the second time."""
+        """Stop everything, release the hold and end all threads; harmless the second time.
+
+        One made by `commanding_as` does nothing: the platform is not its own.
+        """
         shared = self._shared
-        if not shared.closed:
+        if self._first and not shared.closed:
             shared.closed = True
             atexit.unregister(self.close)
             if shared.handling is not None:

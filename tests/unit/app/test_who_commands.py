@@ -17,7 +17,7 @@ WAITING = RecordedProcedure(name="waiting", step=[WaitForOperatorStep(text="look
 BACK = RecordedProcedure(name="back", step=[MoveStep(axes={"left.x": 0.0})])
 
 
-def test_movements_are_told_by_the_name_of_whoever_commanded_them() -> None:
+def test_movements_bear_the_name_of_whoever_commanded_them() -> None:
     with cosmic.connect(rate=50.0) as rig:
         console = rig.commanding_as("console")
         sources: list[str] = []
@@ -59,7 +59,7 @@ def test_what_runs_by_one_name_runs_for_the_other_too(tmp_path: Path) -> None:
         assert rig.handling.result is console.handling.result
 
 
-def test_closing_by_one_name_closes_for_the_other() -> None:
+def test_only_who_made_the_platform_closes_it() -> None:
     with cosmic.connect(rate=50.0) as rig:
         rig.commanding_as("console").close()
-        assert not rig.running
+        rig.mico["left.y"].move_by(5.0)
