@@ -127,10 +127,10 @@ class PlatformAudit:
         self._trail.note(entry)
 
     def _look(self, axes: Mico) -> None:
-        found = axes.stop_state
-        if found == self._stop:
-            return
+        found, before = axes.stop_state, self._stop
         self._stop = found
+        if found.reason == before.reason:
+            return  # as it was; closing stops once more, for the same reason
         what = "stop" if found.reason is not None else "reset of the stop"
         self._trail.note(AuditEntry("?", LOCAL, what, DONE, found.reason or ""))
 

@@ -463,8 +463,8 @@ class Rig:
                 run.join()
             if shared.control is not None:
                 shared.control.close()
-            self._at_end.close()
             self._platform.shut_down()
+            self._at_end.close()  # what watches it has seen everything by now
 
     def __enter__(self) -> Self:
         return self
