@@ -88,7 +88,7 @@ def full_platform(*, campaign: bool = True, seed: int = 1) -> Iterator[FullStand
         window = OperatorWindow(platform, settings, ring)
         at_end.callback(app.sendPostedEvents, None, QEvent.Type.DeferredDelete.value)
         at_end.callback(window.deleteLater)
-        at_end.callback(window.close)
+        at_end.callback(window.close_now)
         window.show()
         window.resize(1600, 1000)
         rig = Rig(platform, "benchmark")

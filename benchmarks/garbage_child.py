@@ -90,7 +90,7 @@ def _work(window: OperatorWindow) -> None:
             running=not campaign.over,
         )
         campaign.abort("the benchmark is over")
-        window.close()
+        window.close_now()
 
     QTimer.singleShot(round(1000 * SECONDS), window, finish)
 

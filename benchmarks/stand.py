@@ -160,7 +160,7 @@ def stand(
         window = OperatorWindow(platform, settings, ring)
         at_end.callback(app.sendPostedEvents, None, QEvent.Type.DeferredDelete.value)
         at_end.callback(window.deleteLater)
-        at_end.callback(window.close)
+        at_end.callback(window.close_now)
         window.show()
         window.resize(1600, 1000)
         api = Mico(mico, "benchmark")

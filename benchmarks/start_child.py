@@ -72,7 +72,7 @@ class Watch(QObject):
             self._timer.stop()
             times_s["usable"] = time.monotonic() - BEGAN_S
             times_s["cpu"] = time.process_time()
-            self._window.close()
+            self._window.close_now()
 
 
 def _watched(window: OperatorWindow) -> None:
