@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("QT_LOGGING_RULES", "qt.qpa.*=false;default.warning=false")
 
-from PySide6.QtCore import QCoreApplication, QEvent, QMetaObject, QSettings, Qt, QTimer
+from PySide6.QtCore import QCoreApplication, QEvent, QSettings, QTimer
 from PySide6.QtWidgets import QApplication
 
 from benchmarks.traced import TracedLibrary
@@ -77,7 +77,7 @@ class Stand:
             except BaseException as exc:  # noqa: BLE001 - raised again below, in the main thread
                 failures.append(exc)
             finally:
-                QMetaObject.invokeMethod(self.app, "quit", Qt.ConnectionType.QueuedConnection)
+                self.app.exit()  # `quit` asks the window first, and that asks a person
 
         thread = threading.Thread(target=body, name="benchmark")
         QTimer.singleShot(0, thread.start)
