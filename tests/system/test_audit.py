@@ -69,7 +69,14 @@ def test_what_a_script_commands_on_its_own_platform_stands_in_the_trail() -> Non
     moves = [(each["who"], each["verdict"]) for each in kept if each["what"] == "move left.x"]
     assert ("script", "begun") in moves
     assert any(verdict == "refused" for _, verdict in moves)
-    assert [each["why"] for each in kept if each["what"] == "stop"] == ["enough"]
+    stops = [(each["what"], each.get("why")) for each in kept if "stop" in each["what"]]
+    assert stops == [("stop", "enough")] * 2, "closing stops once more"
+
+
+def test_closing_is_no_reset_of_a_stop() -> None:
+    with cosmic.connect(applications=("mico",), rate=20) as rig:
+        rig.mico["left.x"].move_to(2.0)
+    assert [each for each in read_entries(audit_file()) if "stop" in each["what"]] == []
 
 
 def test_every_command_stands_in_the_trail_and_can_be_found(

@@ -129,8 +129,8 @@ class PlatformAudit:
     def _look(self, axes: Mico) -> None:
         found, before = axes.stop_state, self._stop
         self._stop = found
-        if found.reason == before.reason:
-            return  # as it was; closing stops once more, for the same reason
+        if found == before or (found.reason is None and before.reason is None):
+            return  # closing halts all once more, which is no reset
         what = "stop" if found.reason is not None else "reset of the stop"
         self._trail.note(AuditEntry("?", LOCAL, what, DONE, found.reason or ""))
 

@@ -88,7 +88,7 @@ class Rig:
         What runs by one of them runs for the other too. The platform is closed by the first alone:
         closing this one does nothing.
         """
-        return Rig(self._platform, source, at_end=self._at_end, shared=self._shared)
+        return Rig(self._platform, source, shared=self._shared)
 
     @override
     def __repr__(self) -> str:

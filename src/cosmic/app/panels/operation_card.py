@@ -44,7 +44,7 @@ def at_work(view: NodeView) -> str:
     running = (each.name for each in view.walk() if each.kind == OPERATION)
     states = {each.name: each.state for each in view.walk() if each.kind == OPERATION}
     found = next((name for name in running if states[name] in RUNNING_STATES), "")
-    return f"{found} ".replace(" uN ", " µN ").strip()  # files and logs keep to ASCII
+    return with_micro_signs(found)
 
 
 class OperationCard(QFrame):
@@ -205,7 +205,7 @@ class OperationCard(QFrame):
         ending = run.state is RunState.ABORTING
         self.badge.set_state(State.BUSY)
         view = run.tree
-        self.line.setText("ending, and making safe" if ending else with_micro_signs(at_work(view)))
+        self.line.setText("ending, and making safe" if ending else at_work(view))
         self.progress.setValue(round(100 * share_done(view)))
         if ending and self.stop.hasFocus():
             self.setFocus()
