@@ -4,8 +4,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractButton
 from pytestqt.qtbot import QtBot
 
+from cosmic.app.windows.closing import ParkDialog
 from cosmic.app.windows.operator_window import OperatorWindow
-from cosmic.app.windows.park import ParkDialog
 from gui.app.windows import mico
 
 LEFT = Qt.MouseButton.LeftButton

@@ -1,13 +1,22 @@
-"""Closing asks first while something would be lost: a run, a recording, a fibre that is held."""
+"""Closing asks first: while something would be lost, and whether to park the tools."""
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from typing import Final
 
-from PySide6.QtCore import QObject, Qt
-from PySide6.QtWidgets import QMessageBox, QWidget
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QMessageBox, QPushButton, QWidget
 
 from cosmic.app.rig import A_CAMPAIGN, Rig
 from cosmic.app.windows.fibre_menu import FibreOperations
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.relay import Relay
+from cosmic.frame.operation import Progress
+from cosmic.frame.overrides import override
+from cosmic.mico.gui.mico_widget import MicoWidget
+
+PARK: Final = "park"
+"""Name of the pose that tools are parked in."""
 
 
 def what_is_lost(rig: Rig, operations: FibreOperations | None, *, force: bool) -> tuple[str, ...]:
@@ -47,53 +56,55 @@ def what_is_lost(rig: Rig, operations: FibreOperations | None, *, force: bool) -
 
 
 class CloseDialog(QMessageBox):
-    """Says what is lost, and asks whether to close all the same; it never blocks."""
+    """Asks whether to close, with `now` and `cancel`; it never blocks."""
 
-    def __init__(self, lost: Sequence[str], parent: QWidget) -> None:
+    def __init__(self, text: str, parent: QWidget) -> None:
         super().__init__(parent)
         self.setObjectName("closeDialog")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setIcon(QMessageBox.Icon.NoIcon)
         self.setWindowTitle("Close")
-        self.setText("Close the window now?")
-        self.setInformativeText("\n".join(lost))
-        role = QMessageBox.ButtonRole
-        self.now = self.addButton("Close now", role.DestructiveRole)
-        self.cancel = self.addButton("Cancel", role.RejectRole)
+        self.setText(text)
+        self.now = self.addButton("Close now", QMessageBox.ButtonRole.DestructiveRole)
+        self.cancel = self.addButton("Cancel", QMessageBox.ButtonRole.RejectRole)
         self.setDefaultButton(self.cancel)
         self.setEscapeButton(self.cancel)
         self.setModal(False)
 
 
-class Closing(QObject):
-    """Asks once for each attempt to close, while something would be lost; GUI thread.
+class ParkDialog(CloseDialog):
+    """Asks whether to park before the window closes."""
 
-    Parameters
-    ----------
-    lost : callable
-        Returns what ends with the window, a sentence each.
-    window : QWidget
-        What closes.
-    """
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(f"Move the tools to the pose {PARK} before the window closes?", parent)
+        self.setObjectName("parkDialog")
+        self.park: QPushButton = self.addButton(
+            "Park, then close", QMessageBox.ButtonRole.AcceptRole
+        )
 
-    def __init__(self, lost: Callable[[], Sequence[str]], window: QWidget) -> None:
+
+class _Asking(QObject):
+    """Asks once for each attempt to close, where there is something to ask; GUI thread."""
+
+    def __init__(self, window: QWidget) -> None:
         super().__init__(window)
-        self._lost, self._window = lost, window
+        self._window = window
         self._answered = False
         self.dialog: CloseDialog | None = None
+
+    @abstractmethod
+    def _question(self) -> CloseDialog | None:
+        """Return what to ask; None: nothing."""
 
     def asks(self) -> bool:
         """Ask, where there is something to ask; True: the window is not to close now."""
         if self.dialog is not None:
             self.dialog.raise_()
             return True
-        if self._answered:
+        dialog = None if self._answered else self._question()
+        if dialog is None:
             return False
-        lost = self._lost()
-        if not lost:
-            return False
-        dialog = CloseDialog(lost, self._window)
-        dialog.now.clicked.connect(self._on_now)
+        dialog.now.clicked.connect(self._close)
         dialog.destroyed.connect(self._on_gone)
         self.dialog = dialog
         dialog.show()
@@ -109,7 +120,93 @@ class Closing(QObject):
     def _on_gone(self) -> None:
         self.dialog = None
 
-    def _on_now(self) -> None:
+    def _close(self) -> None:
         self._answered = True
         self.dialog = None
         self._window.close()
+
+
+class Closing(_Asking):
+    """Asks while something would be lost; GUI thread.
+
+    Parameters
+    ----------
+    lost : callable
+        Returns what ends with the window, a sentence each.
+    window : QWidget
+        What closes.
+    """
+
+    def __init__(self, lost: Callable[[], Sequence[str]], window: QWidget) -> None:
+        super().__init__(window)
+        self._lost = lost
+
+    @override
+    def _question(self) -> CloseDialog | None:
+        lost = self._lost()
+        if not lost:
+            return None
+        dialog = CloseDialog("Close the window now?", self._window)
+        dialog.setInformativeText("\n".join(lost))
+        return dialog
+
+
+class Parking(_Asking):
+    """Offers to park the tools, where that is safe and there is a pose to go to; GUI thread.
+
+    Never while an object may be held, something moves, or motion is stopped.
+
+    Parameters
+    ----------
+    gui : MicoWidget
+        Whose tools are parked.
+    busy : callable
+        Tells whether something moves or runs.
+    window : QWidget
+        What closes.
+
+    Signals
+    -------
+    failed(str)
+        The tools could not be parked; the window stays.
+    """
+
+    failed = Signal(str)
+
+    def __init__(self, gui: MicoWidget, busy: Callable[[], bool], window: QWidget) -> None:
+        super().__init__(window)
+        self._gui, self._busy = gui, busy
+        self._relay = Relay(self._on_progressed)
+
+    @override
+    def _question(self) -> CloseDialog | None:
+        if not self._may_park():
+            return None
+        dialog = ParkDialog(self._window)
+        dialog.park.clicked.connect(self._on_park)
+        return dialog
+
+    def _may_park(self) -> bool:
+        mico = self._gui.mico
+        try:
+            if not mico.ready or mico.stop_state.reason is not None or self._busy():
+                return False
+            return PARK in mico.poses.names and not mico.application.cautions.reasons()
+        except CosmicError:
+            return False  # what cannot be asked must not keep the window open
+
+    def _on_park(self) -> None:
+        try:
+            task = self._gui.mico.poses.go(PARK, wait=False)
+        except CosmicError as exc:
+            self.failed.emit(str(exc))
+            return
+        task.subscribe(self._relay)
+
+    def _on_progressed(self, progress: Progress) -> None:
+        if not progress.done:
+            return
+        if progress.error:
+            self.failed.emit(progress.error)
+        else:
+            self._close()

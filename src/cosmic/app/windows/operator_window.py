@@ -19,10 +19,9 @@ from cosmic.app.panels.scene import ScenePanel
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
 from cosmic.app.stations.host import StationHost
-from cosmic.app.windows.closing import Closing, what_is_lost
+from cosmic.app.windows.closing import Closing, Parking, what_is_lost
 from cosmic.app.windows.coaching import coach_rules
 from cosmic.app.windows.hint_bar import HintBar, first_steps
-from cosmic.app.windows.park import Parking
 from cosmic.app.windows.stations import WindowStations
 from cosmic.app.windows.tasks import (
     FORCE,
