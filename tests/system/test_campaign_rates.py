@@ -1,10 +1,12 @@
 """A campaign takes as long on the platform, and finds the same, however fast the twin runs."""
 
+import math
 from pathlib import Path
 
 import pytest
 
 import cosmic
+from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.campaign.records import FibreRecord, Outcome
 from cosmic.autonomy.campaign.store_read import CampaignReader
 
@@ -31,6 +33,10 @@ def one_fibre(rate: float, folder: Path) -> FibreRecord:
     return record
 
 
+def half_width(bending: BendingResult) -> float:
+    return (bending.ei_high_n_m2 - bending.ei_low_n_m2) / 2.0
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_one_seed_gives_one_result_at_every_rate(tmp_path: Path) -> None:
@@ -44,7 +50,11 @@ def test_one_seed_gives_one_result_at_every_rate(tmp_path: Path) -> None:
     for record in found.values():
         assert record.outcome is Outcome.GOOD
         assert record.bending is not None
-        assert record.bending.ei_n_m2 == pytest.approx(first.bending.ei_n_m2, rel=0.05)
+        # Repeated, a rate differs from itself by 2.7 % (one standard deviation of nine campaigns):
+        # noise falls elsewhere. What may not be is a difference their intervals do not know.
+        difference = record.bending.ei_n_m2 - first.bending.ei_n_m2
+        assert abs(difference) <= math.hypot(half_width(record.bending), half_width(first.bending))
+        assert record.bending.ei_n_m2 == pytest.approx(first.bending.ei_n_m2, rel=0.15)
         assert record.shape.length_um == pytest.approx(first.shape.length_um, rel=0.01)
         # 15 % where the computer is quiet; at the pace of before it was 20 times as long.
         assert record.duration_s == pytest.approx(first.duration_s, rel=0.5)
