@@ -123,7 +123,7 @@ def measure(quick: bool = False) -> list[Figure]:
     beside: list[Seen] = []
     came: list[dict[str, int]] = []
     with full_platform(campaign=False) as bench, served(bench) as (address, token):
-        looker = Looker(_live_view(bench))
+        looker = Looker(live_view(bench))
 
         def work() -> None:
             for _ in range(turns):
@@ -155,7 +155,8 @@ def measure(quick: bool = False) -> list[Figure]:
     ]
 
 
-def _live_view(bench: FullStand) -> CameraView:
+def live_view(bench: FullStand) -> CameraView:
+    """Return the live view of the first camera, in the workspace Look."""
     bench.window.workspaces.choose(LOOK)
     first = next(iter(bench.rig.vico.cameras))
     (view,) = (each for each in bench.window.findChildren(CameraView) if each.camera.name == first)
