@@ -1,8 +1,8 @@
 """What an operator waits for in the window while a campaign runs beside it in the same process.
 
 From an input in the queue of the window's thread until what it changes is painted: a pressed
-button, another workspace, another theme. Besides: how many
-of the camera's images are shown, how many times a second the force is, and how long the window takes to close.
+button, another workspace, another theme. Besides: how many of the camera's images are shown, how
+many times a second the force is, and how long the window takes to close.
 """
 
 import statistics

@@ -72,14 +72,17 @@ class Rig:
         self._daqco = daqco_of(platform.daqco) if platform.daqco is not None else None
         self._vico = vico_of(platform.vico) if platform.vico is not None else None
         self._shared, self._first = shared or SharedRuns(), shared is None
-        if self._mico is not None and shared is None:
-            self._shared.control = Control(
-                self._mico,
-                self._daqco,
-                platform.file.control,
-                platform.policy,
-                rate=platform.clock.rate,
-            )
+        self._control: Control | None = None
+        if self._mico is not None:
+            if self._shared.control is None:
+                self._shared.control = Control(
+                    self._mico,
+                    self._daqco,
+                    platform.file.control,
+                    platform.policy,
+                    rate=platform.clock.rate,
+                )
+            self._control = self._shared.control.commanding_by(self._mico)
         self._handling: FibreHandling | None = None
 
     def commanding_as(self, source: str) -> "Rig":
@@ -124,9 +127,9 @@ class Rig:
     @property
     def control(self) -> Control:
         """Control loops; raises `NotAvailable` where mico is not hosted."""
-        if self._shared.control is None:
+        if self._control is None:
             raise NotAvailable("mico is not hosted here; a control loop needs axes")
-        return self._shared.control
+        return self._control
 
     def application(self, name: str) -> Any:
         """Return an application of another package, as it offers itself to scripts.

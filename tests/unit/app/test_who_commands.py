@@ -6,6 +6,9 @@ from typing import Any
 import pytest
 
 import cosmic
+from cosmic.autonomy.control.control import Control
+from cosmic.autonomy.control.handle import ControlHandle
+from cosmic.autonomy.control.pid import PidGains
 from cosmic.autonomy.recorded.operations import Surroundings
 from cosmic.autonomy.recorded.replay import replay_on
 from cosmic.autonomy.recorded.steps import MoveStep, RecordedProcedure, WaitForOperatorStep
@@ -42,7 +45,6 @@ def test_movements_bear_the_name_of_whoever_commanded_them() -> None:
 def test_what_runs_by_one_name_runs_for_the_other_too(tmp_path: Path) -> None:
     with cosmic.connect(rate=50.0) as rig:
         console = rig.commanding_as("console")
-        assert console.control is rig.control
         changes: list[str] = []
         rig.handling.subscribe(lambda: changes.append(rig.running))
         run = replay_on(console.handling, WAITING, Surroundings())
@@ -57,6 +59,33 @@ def test_what_runs_by_one_name_runs_for_the_other_too(tmp_path: Path) -> None:
         assert "waiting" in changes
         assert rig.handling.result is not None
         assert rig.handling.result is console.handling.result
+
+
+def test_a_control_loop_moves_by_the_name_of_whoever_began_it() -> None:
+    with cosmic.connect(rate=50.0) as rig:
+        console = rig.commanding_as("console")
+        sources: set[str] = set()
+
+        def note(news: Any) -> None:
+            if isinstance(news, AxisBegun):
+                sources.add(news.source)
+
+        rig.mico.follow_movements(note)
+
+        def hold(control: Control) -> ControlHandle:
+            return control.hold(
+                "left.y", "left.y", 5.0, PidGains(4.0), speed=100.0, travel=200.0, tolerance=2.0
+            )
+
+        loop = hold(console.control)
+        assert rig.control.loops == (loop,)
+        assert rig.control.newest is loop
+        with pytest.raises(NotAvailable, match="already uses it"):
+            hold(rig.control)
+        loop.wait_settled()
+        rig.control.stop()
+        loop.join()
+        assert sources == {"console"}
 
 
 def test_only_who_made_the_platform_closes_it() -> None:

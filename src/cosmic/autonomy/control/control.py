@@ -1,6 +1,7 @@
 """The control loops of the scripted API: ``rig.control``."""
 
 import math
+from dataclasses import dataclass, field
 from threading import Lock
 
 from cosmic.autonomy.control.force_servo import ForceGoal, ForceServo
@@ -22,6 +23,17 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.mico import Mico
 
 
+@dataclass(slots=True)
+class RunningLoops:
+    """The loops of a platform, whoever began them."""
+
+    settings: ControlSettings
+    by_axis: dict[str, ControlHandle] = field(default_factory=dict)
+    newest: ControlHandle | None = None
+    closed: bool = False
+    lock: Lock = field(default_factory=Lock)
+
+
 @checked_class
 class Control:
     """Makes control loops and knows those that run; any thread.
@@ -30,6 +42,8 @@ class Control:
     ----------
     rate : float
         Of the platform's clock.
+    loops : RunningLoops or None
+        Those that another one knows, and this one then too.
     """
 
     def __init__(
@@ -40,26 +54,38 @@ class Control:
         policy: FailurePolicy,
         *,
         rate: float = 1.0,
+        loops: RunningLoops | None = None,
     ) -> None:
         self._mico, self._daqco = mico, daqco
-        self.settings = settings
         self._policy = policy
         self._rate = rate
-        self._lock = Lock()
-        self._loops: dict[str, ControlHandle] = {}
-        self._newest: ControlHandle | None = None
-        self._closed = False
+        self._all = loops or RunningLoops(settings)
+
+    @property
+    def settings(self) -> ControlSettings:
+        """What a loop does where nothing else is said; the next loop has another one set here."""
+        return self._all.settings
+
+    @settings.setter
+    def settings(self, settings: ControlSettings) -> None:
+        self._all.settings = settings
+
+    def commanding_by(self, mico: Mico) -> "Control":
+        """Return the same loops, whose movements are logged as those of `mico` from here on."""
+        return Control(
+            mico, self._daqco, self.settings, self._policy, rate=self._rate, loops=self._all
+        )
 
     @property
     def loops(self) -> tuple[ControlHandle, ...]:
-        """The loops that run."""
-        with self._lock:
-            return tuple(each for each in self._loops.values() if each.running)
+        """The loops that run, also those that another source began."""
+        with self._all.lock:
+            return tuple(each for each in self._all.by_axis.values() if each.running)
 
     @property
     def newest(self) -> ControlHandle | None:
         """The loop begun last, also when it has ended; None before the first."""
-        return self._newest
+        return self._all.newest
 
     @property
     def channels(self) -> dict[str, str]:
@@ -201,9 +227,9 @@ class Control:
 
     def close(self) -> None:
         """End all loops for good and wait for their threads."""
-        with self._lock:
-            self._closed = True
-            handles = list(self._loops.values())
+        with self._all.lock:
+            self._all.closed = True
+            handles = list(self._all.by_axis.values())
         for handle in handles:
             handle.stop()
         for handle in handles:
@@ -233,10 +259,10 @@ class Control:
             limits=limits,
             settle_s=settings.settle_s,
         )
-        with self._lock:
-            if self._closed:
+        with self._all.lock:
+            if self._all.closed:
                 raise NotAvailable("the platform is closed")
-            other = self._loops.get(sink.name)
+            other = self._all.by_axis.get(sink.name)
             if other is not None and other.running:
                 raise NotAvailable(
                     f"{sink.name}: a control loop already uses it; stop that loop first"
@@ -244,7 +270,7 @@ class Control:
             if other is not None:
                 other.join()
             loop.begin()
-            self._loops[sink.name] = self._newest = handle
+            self._all.by_axis[sink.name] = self._all.newest = handle
         return handle
 
 
