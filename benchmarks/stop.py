@@ -39,6 +39,7 @@ CALL = "SA_Stop_A"
 SPEED_HZ, WAY_UM, WAY_STEPS = 100, 60.0, 400
 PAUSE_S = (0.01, 0.08)
 BLOCKED_S = 0.2
+ONE_AXIS = "right.x"
 LONGEST_S = 60.0
 P99_MS, WORST_MS, LOADED_P99_MS = 10.0, 25.0, 60.0
 TRAJECTORY = "cosmic-trajectory 1\nplatform {}\nleft.x to -400 um\nleft.x to 0 um\n"
@@ -73,11 +74,12 @@ class Taken:
 
 
 class Watch:
-    """Sees when every channel has been stopped; for the thread that makes it."""
+    """Sees when every channel has been stopped, or that of `axis`; for the thread that makes it."""
 
-    def __init__(self, stand: FullStand) -> None:
+    def __init__(self, stand: FullStand, axis: str | None = None) -> None:
         self._library = stand.library
-        self._count = len(list(stand.mico))
+        addresses = [each.details.address for each in stand.mico if axis in (None, each.key)]
+        self._wanted = {(each.device, each.channel) for each in addresses}
         self._reached: dict[tuple[int, int], float] = {}
         self._all = threading.Event()
         self._thread = threading.get_ident()
@@ -92,7 +94,7 @@ class Watch:
         self._library.left[CALL] = self._note
         began_s = stop()
         if not self._all.wait(LONGEST_S):
-            raise RuntimeError(f"only {len(self._reached)} of {self._count} channels were stopped")
+            raise RuntimeError(f"only {len(self._reached)} channels were stopped")
         del self._library.left[CALL]
         return Taken(max(self._reached.values()) - began_s, self._core_s - before_s)
 
@@ -101,8 +103,10 @@ class Watch:
         self._core.close()
 
     def _note(self, when_s: float, args: tuple[int, ...]) -> None:
+        if (args[0], args[1]) not in self._wanted:
+            return
         self._reached.setdefault((args[0], args[1]), when_s)
-        if len(self._reached) == self._count and not self._all.is_set():
+        if len(self._reached) == len(self._wanted) and not self._all.is_set():
             if threading.get_ident() == self._thread:
                 self._core_s = self._core.now_s()
             self._all.set()
@@ -124,6 +128,14 @@ def all_axes(stand: FullStand, number: int) -> Callable[[], object]:
                 axis.steps(sign * WAY_STEPS, frequency_hz=1000, wait=False)
             else:
                 axis.move_by(sign * WAY_UM, wait=False)
+    return nothing
+
+
+def one_axis(stand: FullStand, number: int) -> Callable[[], object]:
+    """Let one axis go to and fro slowly."""
+    axis = stand.mico[ONE_AXIS]
+    axis.move_by(-WAY_UM if number % 2 else WAY_UM, wait=False)
+    wait_until(lambda: axis.details.in_motion)
     return nothing
 
 
@@ -237,12 +249,17 @@ def another_process(stand: FullStand) -> Iterator[Stop]:
 
 
 def collect(
-    stand: FullStand, count: int, begin: Begin = all_axes, stop: Stop | None = None
+    stand: FullStand,
+    count: int,
+    begin: Begin = all_axes,
+    stop: Stop | None = None,
+    *,
+    axis: str | None = None,
 ) -> list[Taken]:
-    """Stop everything `count` times while it moves."""
+    """Stop everything `count` times while it moves; measured of all, or of one axis."""
     rng = random.Random(1)
     taken = []
-    with closing(Watch(stand)) as watch:
+    with closing(Watch(stand, axis)) as watch:
         for number in range(count):
             end = begin(stand, number)
             time.sleep(rng.uniform(*PAUSE_S))
@@ -281,6 +298,8 @@ def every_kind(stand: FullStand, many: int, some: int, few: int) -> list[Figure]
     found = rows("from another thread", collect(stand, many), worst_ms=WORST_MS)
     stand.library.lets_go = True
     found += rows("library in C", collect(stand, some), worst_ms=WORST_MS)
+    one = collect(stand, some, one_axis, axis=ONE_AXIS)
+    found += rows("library in C, the one axis that moves", one, worst_ms=WORST_MS)
     stand.library.lets_go = False
     found += rows("one thread hangs", collect(stand, few, one_thread_hangs))
     key = Key(stand)

@@ -34,6 +34,19 @@ def test_stop_reaches_every_channel_and_stays():
         assert rig["d0.c1"].move_to(1.0) == 1.0
 
 
+def test_what_moves_is_stopped_before_what_stands():
+    with mico(("LLN", "LLL"), instant=False) as (rig, controller):
+        movement = rig["d1.c1"].move_to(100.0, wait=False)
+        wait_until(lambda: rig["d1.c1"].details.in_motion)
+        controller.calls.clear()
+        rig.application.manager.stop("test")
+        first = [channel for what, channel, *_ in controller.calls if what == "stop"]
+        assert first[0] == Channel(1, 1)
+        assert set(first) == {axis.details.address for axis in rig}
+        with pytest.raises(cosmic.StoppedError):
+            movement.wait(2)
+
+
 def test_the_first_reason_stays_until_the_reset():
     with mico() as (rig, _):
         manager = rig.application.manager

@@ -223,9 +223,15 @@ class DeviceThreads:
             listener.start()
             device.begin()
 
-    def stop_channels(self, device: Device) -> None:
-        """Stop every channel of a device, past its thread."""
-        for channel in device.container.channels():
+    def stop_channels(self, devices: Iterable[Device]) -> None:
+        """Stop every channel of devices, past their threads: first those known to move.
+
+        Each call into a library in C may have to wait for the interpreter, and what stands can.
+        """
+        channels = [
+            (device, channel) for device in devices for channel in device.container.channels()
+        ]
+        for device, channel in sorted(channels, key=_stands):
             try:
                 self._controller.stop(device.container.address(channel))
             except DeviceError as exc:
@@ -236,20 +242,24 @@ class DeviceThreads:
     def end(self, devices: Iterable[Device]) -> None:
         """Stop every channel, end the threads that run, and stop every channel once more."""
         running = [device for device in devices if device.isRunning()]
-        for device in running:  # past the threads, one of which may hang in the library
-            self.stop_channels(device)
+        self.stop_channels(running)  # past the threads, one of which may hang in the library
         for device in running:
             device.request_end()
         self._stuck = [device for device in running if not device.join()]
         for device in self._stuck:
             logger.error("%s hangs in the library and was left behind", device.name)
-        for device in running:
-            self.stop_channels(device)
+        self.stop_channels(running)
         for listener in self._listeners.values():
             listener.request_end()
         for listener in self._listeners.values():
             listener.join()
         self._listeners.clear()
+
+
+def _stands(channel: tuple[Device, int]) -> bool:
+    device, number = channel
+    state = device.container.state(number)
+    return state is None or not state.in_motion
 
 
 CLOSED: Final = "MiCo is closed"
@@ -619,9 +629,7 @@ class DeviceManager(QObject):
         error = refusal(refuse(Reason.STOPPED, f"stopped: {reason}"))
         devices = list(self._devices.values())
         with urgent(kept=self.controller.capabilities.keeps_interpreter):
-            for device in devices:
-                if device.isRunning():
-                    self._threads.stop_channels(device)
+            self._threads.stop_channels(each for each in devices if each.isRunning())
         for device in devices:
             device.stop_later(error)
         logger.warning("stop: %s", reason)
