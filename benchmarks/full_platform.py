@@ -59,8 +59,21 @@ class FullStand(Stand):
 
 
 @contextmanager
-def full_platform(*, campaign: bool = True, seed: int = 1) -> Iterator[FullStand]:
-    """Set up the shipped platform with its whole window, recording and with its camera live."""
+def full_platform(
+    *,
+    campaign: bool = True,
+    seed: int = 1,
+    sample: str | None = SAMPLE,
+    size: tuple[int, int] = (1600, 1000),
+    **how: Any,
+) -> Iterator[FullStand]:
+    """Set up the shipped platform with its whole window, recording and with its camera live.
+
+    Parameters
+    ----------
+    how
+        What else `build_platform` is asked for.
+    """
     app = application()
     load = sim_controllers.load_simulated_scu3d
     traced: list[Any] = []
@@ -76,8 +89,9 @@ def full_platform(*, campaign: bool = True, seed: int = 1) -> Iterator[FullStand
         beside = at_end.enter_context(_campaign(folder, seed)) if campaign else None
         with patch.object(sim_controllers, "load_simulated_scu3d", traced_library):
             platform = build_platform(
-                sample=SAMPLE,
+                sample=sample,
                 seed=seed,
+                **how,
                 mico_gui=make_mico_gui,
                 daqco_gui=make_daqco_gui,
                 vico_gui=make_vico_gui,
@@ -90,7 +104,7 @@ def full_platform(*, campaign: bool = True, seed: int = 1) -> Iterator[FullStand
         at_end.callback(window.deleteLater)
         at_end.callback(window.close_now)
         window.show()
-        window.resize(1600, 1000)
+        window.resize(*size)
         rig = Rig(platform, "benchmark")
         window.open_hardware()
         timer = QTimer(window, interval=REPAINT_MS)
