@@ -247,6 +247,8 @@ class EpicsGateway:
         session = self._session(who)
         if value:
             session.take_control(in_process=True)  # its line is watched instead
+            for motor in self._motors.values():
+                await motor.forget("NO_LEASE")
         else:
             session.release_control()
         await self._show_one(LEASE_TOPIC, self._station.lease.state)
@@ -320,6 +322,8 @@ class EpicsGateway:
                 held = values["axes"].get(axis)
                 if held is not None:
                     await motor.show(held["_latest"])
+                if values["stop_state"].reason is None:
+                    await motor.forget("STOPPED")
         for at, channel in self._states.items():
             if at[0] != application:
                 continue
