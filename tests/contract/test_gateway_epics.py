@@ -14,16 +14,18 @@ from typing import Any
 
 import pytest
 
-from contract.cabinet import Cabinet, WithBell
+from contract.cabinet import Cabinet, Colour, WithBell
 from contract.station_rig import free_port, wait_until
 from cosmic.app.configuration.gateways import Doors, EpicsSettings, HttpSettings
 from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.epics import EpicsGateway
+from cosmic.frame.declaration import state
 from cosmic.frame.failure import Failure, FailurePolicy
 from cosmic.frame.network.host import Host
 from cosmic.frame.network.station import Station
 
 CHILD = Path(__file__).with_name("epics_child.py")
+INVALID = 3
 
 
 class Client:
@@ -125,6 +127,50 @@ def test_what_moves_needs_the_right_and_ends_with_the_client() -> None:
             assert wait_until(lambda: dead_man.expired, 1.0)
             assert wait_until(lambda: door.station.lease.state.local)
         assert not door.failures
+
+
+def test_a_state_is_a_record_with_its_fields_and_says_when_nobody_knows_it() -> None:
+    class Bench(Cabinet):
+        def __init__(self) -> None:
+            super().__init__()
+            self.focus: float | None = None
+            self.count = 2**40
+
+        @property
+        @state
+        def focus_um(self) -> float | None:
+            return self.focus
+
+        @property
+        @state
+        def frames(self) -> int:
+            return self.count
+
+        @property
+        @state
+        def tools(self) -> tuple[str, ...]:
+            return ("tip",)
+
+        def know(self, focus: float | None, count: int) -> None:
+            self.focus, self.count = focus, count
+            self.note_change()
+
+    with opened(Bench) as door, used(door) as client:
+        assert isinstance(door.home, Bench)
+        assert client.get("T:cabinet:lamp:shown:colour") == "red"
+        door.home.lamp.shine(Colour.GREEN, level=0.5)
+        assert wait_until(lambda: client.get("T:cabinet:lamp:shown:colour") == "green")
+        assert client.get("T:cabinet:lamp:shown:level") == 0.5
+        for name in ("focus_um", "frames"):
+            assert wait_until(lambda name=name: client.ask("alarm", f"T:cabinet:{name}") == INVALID)
+        door.home.know(3.5, 7)
+        assert wait_until(lambda: client.get("T:cabinet:focus_um") == 3.5)
+        assert client.ask("alarm", "T:cabinet:focus_um") == 0
+        assert client.get("T:cabinet:frames") == 7
+        door.home.know(None, 8)
+        assert wait_until(lambda: client.ask("alarm", "T:cabinet:focus_um") == INVALID)
+        assert client.ask("find", "T:cabinet:frames", 10)
+        assert not client.ask("find", "T:cabinet:tools", 0.5), "a list is no text"
 
 
 def test_a_gateway_that_only_shows_still_lets_everybody_stop() -> None:

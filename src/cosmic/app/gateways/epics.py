@@ -3,12 +3,15 @@
 import asyncio
 import json
 import logging
+import types
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from dataclasses import fields, is_dataclass
+from enum import Enum
 from itertools import count
-from math import inf, isfinite
+from math import inf
 from threading import Lock
-from typing import Any, Final, get_args
+from typing import Any, Final, Union, get_args, get_origin, get_type_hints
 
 from cosmic.app.configuration.gateways import EpicsSettings
 from cosmic.app.gateways import epics_channels as ca
@@ -329,9 +332,9 @@ class EpicsGateway:
                 continue
             value: Any = values
             for step in at[1:]:
-                value = value.get(step) if isinstance(value, Mapping) else None
-            if value is not None:
-                await _show_plain(channel, value)
+                inside = isinstance(value, Mapping)
+                value = value.get(step) if inside else getattr(value, step, None)
+            await _show_plain(channel, value)
 
     async def _show_samples(self, chunk: DataChunk) -> None:
         served: Any = self._hosts["daqco"].served
@@ -396,18 +399,42 @@ def _keys(
 
 
 def _plain_states(served: Declared, at: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Yield where each state is that is a number, a truth value or a text, and of which kind."""
+    """Yield where each state is that is a number, a truth value or a text, and of which kind.
+
+    The fields of a state that is made of them are there as well, such as "stop_state", "reason".
+    """
     declaration = declaration_of(type(served))
     for name, each in declaration.state.items():
-        kinds = [kind for kind in (get_args(each.kind) or (each.kind,)) if kind in _PLAIN]
-        if kinds and not each.fixed:
-            yield (*at, name), kinds[0]
+        if each.fixed:
+            continue
+        (kind,) = _kinds(each.kind)[:1] or (None,)
+        if is_dataclass(kind) and isinstance(kind, type):
+            hints = get_type_hints(kind)
+            for field in fields(kind):
+                yield from _if_plain((*at, name, field.name), hints[field.name])
+        else:
+            yield from _if_plain((*at, name), each.kind)
     for name, part in declaration.parts.items():
         found = getattr(served, name)
         inner = found.items() if part.keyed else [("", found)]
         for key, held in inner:
             if held is not None:
                 yield from _plain_states(held, (*at, name, key) if key else (*at, name))
+
+
+def _if_plain(at: tuple[str, ...], annotation: Any) -> Iterator[tuple[tuple[str, ...], Any]]:
+    kinds = _kinds(annotation)
+    if len(kinds) == 1 and kinds[0] in _PLAIN:
+        yield at, kinds[0]
+    elif len(kinds) == 1 and isinstance(kinds[0], type) and issubclass(kinds[0], Enum):
+        yield at, str
+
+
+def _kinds(annotation: Any) -> tuple[Any, ...]:
+    """Return what an annotation lets in, but for None."""
+    alternatives = get_origin(annotation) in (Union, types.UnionType)
+    found = get_args(annotation) if alternatives else (annotation,)
+    return tuple(each for each in found if each is not type(None))
 
 
 def _state_channel(kind: Any) -> Channel:
@@ -417,9 +444,15 @@ def _state_channel(kind: Any) -> Channel:
 
 
 async def _show_plain(channel: Channel, value: object) -> None:
-    if isinstance(value, str):
-        await ca.show(channel, value[:499])
-    elif isinstance(value, float):
-        await ca.show(channel, value, ca.NO_ALARM if isfinite(value) else ca.UNKNOWN)
-    elif isinstance(value, int):
-        await ca.show(channel, max(-(2**31), min(2**31 - 1, int(value))))
+    """Show a value; one that nobody knows has an alarm, where it is a number."""
+    shown = to_json(value)
+    if isinstance(channel, ca.Text):
+        await ca.show(channel, "" if shown is None else str(shown)[:499])
+    elif shown is None:
+        await ca.show(channel, channel.value, ca.UNKNOWN)
+    elif isinstance(shown, float):
+        await ca.show(channel, shown)
+    elif isinstance(shown, int):
+        fits = -(2**31) <= shown < 2**31  # Channel Access has no longer ones
+        newest = shown if fits else channel.value
+        await ca.show(channel, int(newest), ca.NO_ALARM if fits else ca.UNKNOWN)

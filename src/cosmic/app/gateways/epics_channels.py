@@ -58,6 +58,7 @@ ALARMS: Final = {
 Alarm = tuple[AlarmStatus, AlarmSeverity]
 Channel = Any
 """A channel of caproto, which has no types."""
+Text = caproto.ChannelChar
 
 
 @dataclass(frozen=True, slots=True)
