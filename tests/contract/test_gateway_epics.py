@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -127,6 +128,44 @@ def test_what_moves_needs_the_right_and_ends_with_the_client() -> None:
             assert wait_until(lambda: dead_man.expired, 1.0)
             assert wait_until(lambda: door.station.lease.state.local)
         assert not door.failures
+
+
+def test_a_client_that_is_frozen_and_wants_to_be_watched_loses_the_right() -> None:
+    with opened() as door, used(door) as client:
+        assert client.put("T:control", 2)
+        assert client.put("T:cabinet:drawers:left_x:move", '{"target_um": 5.0}')
+        dead_man = door.home.drawers["left.x"].dead_men[-1]
+        client.process.send_signal(signal.SIGSTOP)
+        assert not dead_man.expired
+        assert wait_until(lambda: dead_man.expired, 1.5), "what moves bears 1 s of silence"
+        assert wait_until(lambda: door.station.lease.state.local, 1.5)
+        client.process.send_signal(signal.SIGCONT)
+        assert not client.put("T:cabinet:drawers:left_x:move", '{"target_um": 6.0}')
+        assert door.home.drawers["left.x"].moved_um == [5.0]
+
+
+def test_whatever_a_watched_client_says_keeps_what_moves() -> None:
+    with opened() as door, used(door) as client:
+        assert client.put("T:control", 1)
+        assert client.put("T:control", 2)
+        assert client.put("T:cabinet:drawers:left_x:move", '{"target_um": 5.0}')
+        dead_man = door.home.drawers["left.x"].dead_men[-1]
+        until_s = time.monotonic() + 1.3
+        while time.monotonic() < until_s:
+            assert client.get("T:control") == 1.0
+        assert not dead_man.expired
+
+
+def test_a_right_that_is_not_given_has_its_reason() -> None:
+    with opened() as door, used(door) as client, used(door) as other:
+        assert client.put("T:control", 1)
+        assert not other.put("T:control", 1)
+        assert "held by EPICS" in other.get("T:control:reason")
+        assert not client.put("T:control", -3)
+        assert "seconds of silence" in client.get("T:control:reason")
+        assert client.put("T:control", 0)
+        assert other.put("T:control", 1)
+        assert other.get("T:control:reason") == ""
 
 
 def test_a_state_is_a_record_with_its_fields_and_says_when_nobody_knows_it() -> None:

@@ -44,6 +44,7 @@ logger = logging.getLogger(__name__)
 SHOWN_EVERY_S: Final = 0.04
 IMAGES_EVERY_S: Final = 0.5
 MOST_WAITING: Final = 32
+LONGEST_SILENCE_S: Final = 600
 _PLAIN: Final = (bool, int, float, str)
 
 
@@ -51,7 +52,8 @@ class EpicsGateway:
     """A station as records; `close` it in every case.
 
     Each line of a client is a session of its own. It takes the right to move by a put of 1 to
-    PREFIX + "control", and loses it with its line.
+    PREFIX + "control", and loses it with its line; by a put of seconds, also when it says nothing
+    for so long.
 
     Raises
     ------
@@ -89,6 +91,7 @@ class EpicsGateway:
         self._going: dict[tuple[str, tuple[str, ...]], list[Operation[Any]]] = {}
         self._control = ca.whole(put=self._take)
         self._holder = ca.line()
+        self._why_not = ca.text(length=500)
         channels = dict(self._all_channels())
         self._server = ChannelServer(
             channels,
@@ -96,6 +99,7 @@ class EpicsGateway:
             station.policy,
             self._show,
             self._gone,
+            self._heard,
         )
         self._follow()
         self._server.start()
@@ -134,6 +138,7 @@ class EpicsGateway:
     def _all_channels(self) -> Iterator[tuple[str, Channel]]:
         yield f"{self._prefix}control", self._control
         yield f"{self._prefix}control:holder", self._holder
+        yield f"{self._prefix}control:reason", self._why_not
         for name, host in self._hosts.items():
             values = host.state(whole=False).values
             for command in commands_of(name, type(host.served)):
@@ -248,13 +253,30 @@ class EpicsGateway:
 
     async def _take(self, who: Who, value: int) -> None:
         session = self._session(who)
-        if value:
-            session.take_control(in_process=True)  # its line is watched instead
+        try:
+            self._change_control(session, value)
+        except CosmicError as exc:
+            await ca.show(self._why_not, str(exc)[:499])
+            raise
+        await ca.show(self._why_not, "")
+        if session.in_control:
             for motor in self._motors.values():
                 await motor.forget("NO_LEASE")
-        else:
-            session.release_control()
         await self._show_one(LEASE_TOPIC, self._station.lease.state)
+
+    @staticmethod
+    def _change_control(session: GatewaySession, value: int) -> None:
+        if value == 0:
+            session.release_control()
+        elif value == 1:
+            session.take_control(in_process=True)  # its line is watched instead
+        elif 2 <= value <= LONGEST_SILENCE_S:
+            session.take_control(keep_s=float(value))
+        else:
+            raise CallRefused(
+                "put 1 to take the right to move, 0 to give it back, 2 to "
+                f"{LONGEST_SILENCE_S} to have it for so many seconds of silence"
+            )
 
     def _session(self, who: Who) -> GatewaySession:
         with self._lock:
@@ -266,6 +288,20 @@ class EpicsGateway:
                 )
                 self._sessions[who.address] = found
         return found
+
+    def _heard(self, address: tuple[str, int]) -> None:
+        found = self._sessions.get(address)
+        if found is not None:
+            found.beat()
+
+    def _end_silent(self) -> None:
+        """End what moves for clients that want to be watched and have fallen silent."""
+        with self._lock:
+            watched = [each for each in self._sessions.values() if each.may_be_silent]
+        for each in watched:
+            each.end_silent_motion()
+        if watched:
+            self._station.lease.poll()
 
     def _gone(self, address: tuple[str, int]) -> None:
         with self._lock:
@@ -295,6 +331,7 @@ class EpicsGateway:
         images_due_s = 0.0
         while True:
             await asyncio.sleep(SHOWN_EVERY_S)
+            self._end_silent()
             now_s = WALL.now_s()
             images = now_s >= images_due_s
             if images:

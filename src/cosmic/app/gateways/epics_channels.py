@@ -238,6 +238,7 @@ class _Line(VirtualCircuit):  # type: ignore[misc]  # caproto has no types
 
     @override
     async def _process_command(self, command: Any) -> Any:
+        self.context.heard(tuple(self.circuit.address))
         if isinstance(command, caproto.EventAddRequest):
             held = self.subscriptions.items()
             values = sum(len(each) * of.db_entry.max_length for of, each in held)
@@ -262,6 +263,8 @@ class ChannelServer(WorkerThread):
         `run()` is awaited in the loop beside the server; it shows what changes.
     on_gone : callable
         `on_gone(address)` is called when the line of a client has ended.
+    on_heard : callable
+        `on_heard(address)` is called for each message of a client, before it is carried out.
     """
 
     def __init__(
@@ -271,6 +274,7 @@ class ChannelServer(WorkerThread):
         policy: FailurePolicy,
         run: Callable[[], Awaitable[None]],
         on_gone: Callable[[tuple[str, int]], None],
+        on_heard: Callable[[tuple[str, int]], None],
     ) -> None:
         super().__init__("EPICS server", policy)
         logging.getLogger("caproto").setLevel(logging.ERROR)  # it logs each client that comes
@@ -278,6 +282,7 @@ class ChannelServer(WorkerThread):
         self._interface, self._port = where
         self._run = run
         self._on_gone = on_gone
+        self._on_heard = on_heard
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ending: asyncio.Event | None = None
         self._problem = ""
@@ -320,6 +325,7 @@ class ChannelServer(WorkerThread):
             await accept(client, address)
 
         context.circuit_disconnected, context.tcp_handler = gone, come
+        context.heard = self._on_heard
         context.broadcast_beacon_loop = _nothing  # it would tell the whole network
         serving = asyncio.ensure_future(context.run())
         showing = asyncio.ensure_future(self._run())

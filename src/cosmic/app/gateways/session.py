@@ -117,7 +117,7 @@ class GatewaySession:
             raise CallRefused(f"{self.name} may not move anything")
         token = self._caller.token
         self._station.lease.take(self.name, token, in_process=in_process, keep_s=keep_s)
-        self._keep_s = keep_s
+        self._keep_s = MOVE_LIMIT_S if in_process else keep_s
         self.beat()
 
     def release_control(self) -> None:

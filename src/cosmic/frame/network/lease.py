@@ -3,7 +3,7 @@
 import logging
 import secrets
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Lock
 from typing import Final
 
@@ -128,7 +128,9 @@ class StationLease:
                 pulse = Pulse(name, limit_s=limit_s, clock=self._clock)
                 self._grant = _Grant(name, token, pulse, in_process)
             else:
+                held.pulse.beat(self._clock.now_s())  # who asks is alive
                 held.pulse.bear(limit_s)
+                self._grant = replace(held, in_process=in_process)
             if changed:
                 kept = MOVE_LIMIT_S < limit_s < float("inf")
                 silence = f", who may be silent for {limit_s:g} s" if kept else ""
