@@ -5,9 +5,10 @@ import socket
 import ssl
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 import httpx
@@ -24,6 +25,7 @@ from cosmic.app.gateways.http import HttpGateway
 from cosmic.app.gateways.http_server import BODY_LIMIT_BYTES, listening
 from cosmic.app.gateways.openapi import mcp_tools
 from cosmic.app.panels.approvals import ApprovalsPanel
+from cosmic.frame.declaration import command
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import Failure, FailurePolicy
 from cosmic.frame.network.certificates import make_certificates
@@ -143,6 +145,12 @@ def test_what_moves_needs_the_right_and_goes_through_the_lease(door: Door) -> No
         assert door.station.lease.state.local
 
 
+def test_what_a_command_takes_is_said_in_its_own_names(door: Door) -> None:
+    with door.client() as http:
+        said = http.post("/api/cabinet/drawers/top/move", json={}).json()["error"]["text"]
+    assert said == "drawers.move takes target_um; unknown: none, missing: target_um"
+
+
 def test_settings_and_words_come_as_json(door: Door) -> None:
     with door.client("call") as http:
         settings = {"name": "new", "brightest": 2.0}
@@ -166,6 +174,57 @@ def test_what_goes_on_is_followed_and_ended(door: Door) -> None:
         door.home.tasks[0].finish()
         assert http.get(where, params={"wait": 5}).json()["done"] is True
         assert http.get("/api/operations/999").status_code == 404
+
+
+def test_a_wait_that_makes_no_sense_is_refused_before_anything_moves(door: Door) -> None:
+    with door.client() as http:
+        http.post("/api/control")
+        path = "/api/cabinet/drawers/left.x/move"
+        for wait in ("61", "-1", "nan", "soon"):
+            refused = http.post(path, params={"wait": wait}, json={"target_um": 5.0})
+            assert refused.status_code == 400
+            assert "wait" in refused.json()["error"]["text"]
+        assert door.home.drawers["left.x"].moved_um == []
+
+
+class Busy(Cabinet):
+    """The cabinet with a command that takes until `over` is set."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.begun, self.over = Event(), Event()
+
+    @command(timeout_s=0.1)
+    def toil(self) -> None:
+        self.begun.set()
+        self.over.wait(20.0)
+
+
+@pytest.mark.parametrize("patient", [True, False], ids=["refused", "hung up"])
+def test_a_command_whose_turn_did_not_come_is_not_carried_out_later(*, patient: bool) -> None:
+    with opened(Busy) as door, door.client() as http, door.client("call") as other:
+        home = door.home
+        assert isinstance(home, Busy)
+        toiling = Thread(target=lambda: other.post("/api/cabinet/toil", json={}))
+        toiling.start()
+        assert home.begun.wait(10.0)
+        http.post("/api/control")
+        try:
+            with nullcontext() if patient else suppress(httpx.ReadTimeout):
+                refused = http.post(
+                    "/api/cabinet/drawers/left.x/move",
+                    json={"target_um": 5.0},
+                    timeout=20.0 if patient else 0.3,
+                )
+                assert refused.status_code == 503
+                assert "was not carried out" in refused.json()["error"]["text"]
+            time.sleep(0.5)  # until it is noticed
+            http.post("/api/control")
+        finally:
+            home.over.set()
+            toiling.join(10.0)
+        assert http.post("/api/cabinet/lamp/shine", json={"colour": "green"}).is_success
+        assert door.home.drawers["left.x"].moved_um == []
 
 
 def test_who_hangs_up_while_waiting_ends_what_was_begun(door: Door) -> None:
@@ -338,6 +397,20 @@ def test_a_flood_of_one_client_is_held_back_and_a_stop_still_passes(
         assert other.post("/api/cabinet/stop", json={}).is_success
     assert door.home.stops == 1
     assert not door.failures
+
+
+def test_whoever_asks_too_often_may_stop_all_the_same(
+    door: Door, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosmic.app.gateways.http.MOST_REQUESTS_S", 2.0)
+    with door.client("view") as http:
+        while http.get("/api/station").status_code != 429:
+            pass
+        assert http.post("/api/cabinet/stop", json={}).is_success
+        assert http.post("/api/cabinet/lamp/shine", json={}).status_code == 429
+        stops = [http.post("/api/cabinet/stop", json={}).status_code for _ in range(60)]
+        assert stops[-1] == 429, "a flood of stops is one as well"
+    assert door.home.stops > 10
 
 
 def test_raw_bytes_that_are_no_http_harm_nobody(door: Door) -> None:

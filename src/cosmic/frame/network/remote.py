@@ -94,8 +94,9 @@ class Offered:
         surplus = [str(name)[:60] for name in arguments if name not in self.parameters]
         missing = self.required.difference(arguments)
         if surplus or missing:
+            said = [name for name in self.parameters if name.isidentifier()]  # the rest is ours
             raise CallRefused(
-                f"{self.name} takes {', '.join(self.parameters) or 'nothing'}; "
+                f"{self.name} takes {', '.join(said) or 'nothing'}; "
                 f"unknown: {', '.join(surplus) or 'none'}, "
                 f"missing: {', '.join(sorted(missing)) or 'none'}"
             )
