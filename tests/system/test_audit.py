@@ -46,6 +46,18 @@ def trail(tmp_path: Path) -> Path:
             order = client.order("mico", "axes.begin", {"motion": motion}, ("left.x",))
             with pytest.raises(MoveRefused):
                 client.carry_out(order)
+            client.take_control(in_process=True)
+            other = GatewaySession(station, "guest", Access.MOVE, door="epics")
+            with pytest.raises(MoveRefused):
+                other.take_control()
+            far = {"kind": "MoveTo", "target": 1e6, "unit": "um"}
+            ends = [
+                client.carry_out(client.order("mico", "axes.begin", {"motion": each}, ("left.x",)))
+                for each in (motion, far)
+            ]
+            assert wait_until(lambda: all(each.done for each in ends))
+            client.release_control()
+            other.close()
             mico["left.x"].move_to(2.0)
             with pytest.raises(cosmic.MoveRefused):
                 mico["left.x"].move_to(1e6)
@@ -96,8 +108,20 @@ def test_every_command_stands_in_the_trail_and_can_be_found(
         return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
 
     assert len(listed()) == len(entries)
-    (refused,) = listed("--who", "notebook")
-    assert refused["why"].startswith("NO_LEASE")
+    own = [
+        (each["what"], each["verdict"], each.get("why", "").partition(":")[0])
+        for each in listed("--who", "notebook", "--door", "http")
+    ]
+    begin = "mico.axes.begin"
+    assert own[0] == (begin, "refused", "NO_LEASE")
+    assert sorted(set(own[1:])) == [
+        (begin, "begun", ""),
+        (begin, "done", ""),
+        (begin, "refused", "LIMIT"),
+    ]
+    (refused,) = listed("--who", "guest", "--what", "right to move")
+    assert refused["verdict"] == "refused"
+    assert "held by notebook" in refused["why"]
     assert {each["why"].partition(":")[0] for each in listed("--verdict", "refused")} == {
         "NO_LEASE",
         "LIMIT",
