@@ -125,6 +125,10 @@ def test_an_assistant_uses_the_same_commands_over_mcp(door: Door) -> None:
         http.post("/api/control")
         assert said("tools/call", **move)["result"]["content"][0]["text"] == "4.0"
         assert said("tools/call", name="cabinet_emit", arguments={})["error"]["code"] == -32602
+        for tool, wrong in (("take_control", "keep_s"), ("follow_operation", "wait_s")):
+            for value in (None, "soon", [], True, -1):
+                refused = said("tools/call", name=tool, arguments={wrong: value})["error"]
+                assert refused["message"].startswith(f"{wrong}: a number of seconds")
         assert said("nothing")["error"]["code"] == -32601
         notice = {"jsonrpc": "2.0", "method": "notifications/initialized"}
         assert http.post("/mcp", json=notice).status_code == 202
