@@ -9,7 +9,6 @@ from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from itertools import count
-from math import inf
 from threading import Lock
 from typing import Any, Final, Union, get_args, get_origin, get_type_hints
 
@@ -333,6 +332,8 @@ class EpicsGateway:
             await asyncio.sleep(SHOWN_EVERY_S)
             self._end_silent()
             now_s = WALL.now_s()
+            for value in self._values.values():
+                await value.look(now_s)
             images = now_s >= images_due_s
             if images:
                 images_due_s = now_s + IMAGES_EVERY_S
@@ -379,9 +380,9 @@ class EpicsGateway:
         for row, name in enumerate(chunk.channels):
             record = self._values.get(name)
             if record is not None:
-                limit, scale = limits.get(name), chunk.scales[row]
-                low, high = (limit.low, limit.high) if limit is not None else (-inf, inf)
-                await record.show(scale.apply(chunk.volts[row]), scale.unit, low, high)
+                scale = chunk.scales[row]
+                samples = scale.apply(chunk.volts[row])
+                await record.show(samples, scale.unit, limits.get(name), WALL.now_s())
 
 
 async def _ended(operation: Operation[Any]) -> None:

@@ -2,11 +2,12 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from math import inf, isfinite
+from math import inf, isfinite, nan
 from typing import Any, Final, Protocol
 
 from cosmic.app.gateways import epics_channels as ca
 from cosmic.app.gateways.epics_channels import Alarm, Channel, PutRefused, Who
+from cosmic.daqco.core.limits import Limit
 from cosmic.frame.errors import CosmicError, MoveRefused
 from cosmic.mico.core.motion.positioner import PositionerState
 
@@ -14,6 +15,8 @@ EDGE_S: Final = 0.05
 """Between the last position and `DMOV`: clients get monitors in bundles, and in any order."""
 SETTLED_S: Final = 0.03
 """Between `DMOV` and the end of a put."""
+FRESH_S: Final = 2.0
+"""So long a value is one of now though no sample follows."""
 SMALLEST_STEP: Final = 0.001
 """What `MRES` and the deadband say, in units of the axis."""
 
@@ -288,29 +291,59 @@ def _alarm_of(failure: CosmicError | None) -> Alarm:
 
 
 class ValueRecord:
-    """The newest value of a channel of DAQCo with the limits in force, and its newest samples."""
+    """The newest value of a channel of DAQCo with the limits in force, and its newest samples.
+
+    A value that no sample follows is not that of now: it has an alarm, as one that nobody knows.
+    """
 
     def __init__(self, name: str, unit: str) -> None:
         self._value = ca.number(units=unit)
         self._wave = ca.wave(20_000, unit)
         self._unit = ca.line(unit)
+        self._ends = {"HIHI": ca.number(nan), "LOLO": ca.number(nan)}
+        self._alarms = {"STAT": ca.whole(), "SEVR": ca.whole()}
+        self._newest_s, self._stale = -inf, False
         self.channels = {
             name: self._value,
             f"{name}.VAL": self._value,
             f"{name}.EGU": self._unit,
             f"{name}:wave": self._wave,
         }
+        fields = {**self._ends, **self._alarms}
+        self.channels |= {f"{name}.{field}": each for field, each in fields.items()}
 
-    async def show(self, samples: Any, unit: str, low: float, high: float) -> None:
-        """Show samples in physical units; beyond `low` and `high` they are an alarm."""
-        value = float(samples.mean())
-        alarm = ca.TOO_HIGH if value > high else ca.TOO_LOW if value < low else ca.NO_ALARM
+    async def show(self, samples: Any, unit: str, limit: Limit | None, now_s: float) -> None:
+        """Show samples in physical units; one beyond an armed limit is an alarm."""
+        self._newest_s, self._stale = now_s, False
+        value, armed = float(samples.mean()), limit is not None and limit.armed
+        low, high = (limit.low, limit.high) if limit is not None and armed else (-inf, inf)
+        alarm = ca.NO_ALARM
         if not isfinite(value):
             alarm = ca.UNKNOWN
-        bounds = {
-            "upper_alarm_limit": high if high < inf else 0.0,
-            "lower_alarm_limit": low if low > -inf else 0.0,
-        }
+        elif float(samples.max()) > high:
+            alarm = ca.TOO_HIGH
+        elif float(samples.min()) < low:
+            alarm = ca.TOO_LOW
+        elif limit is not None and limit.tripped:
+            alarm = ca.FAULT
+        ends = {"HIHI": high if high < inf else nan, "LOLO": low if low > -inf else nan}
+        bounds = {"upper_alarm_limit": ends["HIHI"], "lower_alarm_limit": ends["LOLO"]}
+        for field, each in ends.items():
+            await ca.show(self._ends[field], each)
+        await self._show_alarm(alarm)
         await ca.show(self._value, value, alarm, units=unit, **bounds)
         await ca.show(self._wave, samples, alarm)
         await ca.show(self._unit, unit[:39])
+
+    async def look(self, now_s: float) -> None:
+        """Say so where no sample came for too long."""
+        if self._stale or now_s - self._newest_s <= FRESH_S:
+            return
+        self._stale = True
+        await self._show_alarm(ca.UNKNOWN)
+        for channel in (self._value, self._wave):
+            await ca.show(channel, channel.value, ca.UNKNOWN)
+
+    async def _show_alarm(self, alarm: Alarm) -> None:
+        await ca.show(self._alarms["STAT"], int(alarm[0]))
+        await ca.show(self._alarms["SEVR"], int(alarm[1]))
