@@ -196,7 +196,7 @@ def test_a_state_is_a_record_with_its_fields_and_says_when_nobody_knows_it() -> 
 
     with opened(Bench) as door, used(door) as client:
         assert isinstance(door.home, Bench)
-        assert client.get("T:cabinet:lamp:shown:colour") == "red"
+        assert wait_until(lambda: client.get("T:cabinet:lamp:shown:colour") == "red")
         door.home.lamp.shine(Colour.GREEN, level=0.5)
         assert wait_until(lambda: client.get("T:cabinet:lamp:shown:colour") == "green")
         assert client.get("T:cabinet:lamp:shown:level") == 0.5
