@@ -3,10 +3,13 @@
 import json
 import socket
 import ssl
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
@@ -33,6 +36,7 @@ from cosmic.frame.network.host import Host
 from cosmic.frame.network.line_settings import Certificates
 from cosmic.frame.network.station import Station
 
+BROWSER = Path(__file__).with_name("browser_child.py")
 TOKENS = {"move": "m" * 20, "call": "c" * 20, "view": "v" * 20}
 
 
@@ -462,6 +466,38 @@ def test_answers_are_sent_without_waiting_for_an_acknowledgement() -> None:
         with came:
             # asyncio turns Nagle's delay off for what says that it is TCP, and for nothing else.
             assert came.proto == socket.IPPROTO_TCP
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    find_spec("PySide6.QtWebEngineWidgets") is None, reason="there is no browser of Qt here"
+)
+def test_the_page_comes_back_with_its_station() -> None:
+    client = HttpClient(name="desk", token=TOKENS["view"])
+    settings = HttpSettings(listen=f"127.0.0.1:{free_port()}", client=(client,))
+
+    @contextmanager
+    def served(platform: str) -> Iterator[None]:
+        station = Station("fibres", FailurePolicy())
+        about = {"platform": platform, "simulated": True, "applications": []}
+        gateway = HttpGateway(station, {}, settings, about)
+        try:
+            yield
+        finally:
+            gateway.close()
+
+    page = f"http://{settings.listen}/#token={client.token}"
+    with ExitStack() as at_end:
+        with served("the one before"):
+            command = [sys.executable, str(BROWSER), page, "the one after"]
+            browser = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+            at_end.callback(browser.communicate)
+            at_end.callback(browser.kill)
+            time.sleep(5.0)  # until it is shown
+        time.sleep(3.0)  # until it asked in vain
+        with served("the one after"):
+            said, _ = browser.communicate(timeout=45.0)
+    assert "the one after" in said
 
 
 def test_the_page_and_the_description_need_no_token(door: Door) -> None:
