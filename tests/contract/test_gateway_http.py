@@ -52,9 +52,11 @@ class Door:
         return httpx.Client(base_url=self.address, headers=headers, timeout=20.0, **more)
 
     @contextmanager
-    def line(self, access: str = "move", follow: tuple[str, ...] = ()) -> Iterator[Any]:
+    def line(
+        self, access: str = "move", follow: tuple[str, ...] = (), **more: Any
+    ) -> Iterator[Any]:
         with connect(self.address.replace("http", "ws") + "/api/events", proxy=None) as made:
-            made.send(json.dumps({"token": TOKENS[access], "follow": list(follow)}))
+            made.send(json.dumps({"token": TOKENS[access], "follow": list(follow)} | more))
             assert json.loads(made.recv(5.0))["topic"] == "hello"
             yield made
 
@@ -269,6 +271,25 @@ def test_a_client_that_is_gone_leaves_nothing_moving(door: Door) -> None:
         line.socket.shutdown(socket.SHUT_RDWR)
         assert wait_until(lambda: dead_man.expired, 1.0)
         assert door.station.lease.state.local
+
+
+def test_a_line_that_only_looks_keeps_nothing_moving_for_another_program(door: Door) -> None:
+    with door.client() as http, door.line(looks_only=True), door.line(looks_only=True):
+        http.post("/api/control")
+        http.post("/api/cabinet/drawers/top/move", json={"target_um": 1.0})
+        dead_man = door.home.drawers["top"].dead_men[0]
+        assert wait_until(lambda: dead_man.expired, 1.5)
+        assert wait_until(lambda: door.station.lease.state.local, 1.0)
+        http.post("/api/control")
+        with door.line() as line:
+            line.send(json.dumps({"follow": ["cabinet/state"]}))
+            assert json.loads(line.recv(5.0))["topic"] == "cabinet/state"
+        assert wait_until(lambda: door.station.lease.state.local, 0.8), "its own line has ended"
+
+
+def test_the_page_only_looks() -> None:
+    with opened() as door, door.client() as http:
+        assert "looks_only: true" in http.get("/").text
 
 
 def test_who_takes_over_ends_what_goes_on_for_a_client(door: Door) -> None:

@@ -564,14 +564,16 @@ class HttpGateway:
                 return
             if not self._lines.know(socket_.client, found):
                 raise HttpError(429, f"a client has at most {MOST_LINES} connections")
-            found.lines += 1
-            user = found
-            await line.send(json.dumps({"topic": "hello", "payload": user.settings.name}))
-            sending = asyncio.create_task(line.run(user.session.beat))
+            beat = found.session.beat
+            if first.get("looks_only") is True:  # it is there for no program that moves
+                beat = _nothing
+            else:
+                found.lines += 1
+                user = found
+            await line.send(json.dumps({"topic": "hello", "payload": found.settings.name}))
+            sending = asyncio.create_task(line.run(beat))
             try:
-                await self._follow(first, line, ends)
-                while True:
-                    await self._follow(await word_of(socket_), line, ends)
+                await self._follow_words(socket_, first, line, ends)
             finally:
                 line.end()
                 sending.cancel()
@@ -592,6 +594,18 @@ class HttpGateway:
         user.lines -= 1
         if user.lines == 0:
             user.session.hang_up()
+
+    async def _follow_words(
+        self,
+        socket_: WebSocket,
+        first: Mapping[str, Any],
+        line: WebSocketLine,
+        ends: list[Unfollow],
+    ) -> None:
+        word = first
+        while True:
+            await self._follow(word, line, ends)
+            word = await word_of(socket_)
 
     async def _follow(
         self, word: Mapping[str, Any], line: WebSocketLine, ends: list[Unfollow]
@@ -629,6 +643,10 @@ def _give_up(job: Operation[Any]) -> None:
 
     job.cancel()
     job.add_callback(end)
+
+
+def _nothing() -> None:
+    """Take no note."""
 
 
 def _end_all(ends: list[Unfollow]) -> None:
