@@ -15,12 +15,13 @@ from typing import Any
 
 import pytest
 
-from contract.cabinet import Cabinet, Colour, WithBell
+from contract.cabinet import Cabinet, Colour, Lamp, WithBell
 from contract.station_rig import free_port, wait_until
 from cosmic.app.configuration.gateways import Doors, EpicsSettings, HttpSettings
 from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.epics import EpicsGateway
 from cosmic.frame.declaration import state
+from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import Failure, FailurePolicy
 from cosmic.frame.network.host import Host
 from cosmic.frame.network.station import Station
@@ -210,6 +211,37 @@ def test_a_state_is_a_record_with_its_fields_and_says_when_nobody_knows_it() -> 
         assert wait_until(lambda: client.ask("alarm", "T:cabinet:focus_um") == INVALID)
         assert client.ask("find", "T:cabinet:frames", 10)
         assert not client.ask("find", "T:cabinet:tools", 0.5), "a list is no text"
+
+
+def test_parts_that_come_and_go_are_records_as_well() -> None:
+    with opened() as door, used(door) as client:
+        assert client.put("T:control", 1)
+        door.home.put_in("low")
+        door.home.fit(Lamp())
+        time.sleep(0.3)  # a client that searched in vain is slow to search again
+        assert client.ask("find", "T:cabinet:drawers:low:move", 10)
+        assert client.put("T:cabinet:drawers:low:move", '{"target_um": 5.0}')
+        assert door.home.drawers["low"].moved_um == [5.0]
+        assert wait_until(lambda: client.get("T:cabinet:drawers:low:position_um") == 5.0)
+        assert client.put("T:cabinet:spare:shine", '{"colour": "green"}')
+        assert client.put("T:cabinet:drawers:left_x:move", '{"target_um": 6.0}')
+        door.home.take_out("low")
+        assert not client.put("T:cabinet:drawers:low:move", '{"target_um": 7.0}')
+        assert "there is no 'low'" in client.get("T:cabinet:drawers:low:move")
+        with used(door) as later:
+            assert wait_until(
+                lambda: not later.ask("find", "T:cabinet:drawers:low:position_um", 0.2)
+            )
+
+
+def test_two_things_that_would_be_one_record_are_named() -> None:
+    home = Cabinet()
+    home.put_in("left_x")  # beside "left.x"
+    station, host = Station("fibres", FailurePolicy()), Host("cabinet", home)
+    station.host("cabinet", host)
+    with pytest.raises(ConfigError, match="T:cabinet:drawers:left_x:"):
+        EpicsGateway(station, {"cabinet": host}, EpicsSettings(prefix="T:", port=free_port()))
+    host.close()
 
 
 def test_a_gateway_that_only_shows_still_lets_everybody_stop() -> None:

@@ -8,13 +8,14 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from enum import Enum
+from functools import partial
 from itertools import count
 from threading import Lock
 from typing import Any, Final, Union, get_args, get_origin, get_type_hints
 
 from cosmic.app.configuration.gateways import EpicsSettings
 from cosmic.app.gateways import epics_channels as ca
-from cosmic.app.gateways.catalogue import Command, commands_of
+from cosmic.app.gateways.catalogue import Command, commands_of, places_of
 from cosmic.app.gateways.epics_channels import Channel, ChannelServer, Who
 from cosmic.app.gateways.epics_image import ImageRecord
 from cosmic.app.gateways.epics_motor import MotorRecord, ValueRecord
@@ -23,7 +24,7 @@ from cosmic.app.gateways.session import Approve, GatewaySession
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.frame.clock import WALL
 from cosmic.frame.declaration import Declared, declaration_of
-from cosmic.frame.errors import CosmicError
+from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.errors import Busy, CallRefused
@@ -45,6 +46,7 @@ IMAGES_EVERY_S: Final = 0.5
 MOST_WAITING: Final = 32
 LONGEST_SILENCE_S: Final = 600
 _PLAIN: Final = (bool, int, float, str)
+_Make = Callable[[], Channel]
 
 
 class EpicsGateway:
@@ -58,6 +60,8 @@ class EpicsGateway:
     ------
     NotAvailable
         It cannot listen there.
+    ConfigError
+        Two things would have the same name.
     """
 
     def __init__(
@@ -91,7 +95,13 @@ class EpicsGateway:
         self._control = ca.whole(put=self._take)
         self._holder = ca.line()
         self._why_not = ca.text(length=500)
-        channels = dict(self._all_channels())
+        self._of: dict[str, dict[str, _Make]] = {}
+        self._there: dict[str, object] = {}
+        channels: dict[str, Channel] = {}
+        for name, channel in self._all_channels():
+            if name in channels:
+                raise ConfigError(f"EPICS: two things would be the record {name}; rename one")
+            channels[name] = channel
         self._server = ChannelServer(
             channels,
             (settings.interface, settings.port),
@@ -140,14 +150,45 @@ class EpicsGateway:
         yield f"{self._prefix}control:reason", self._why_not
         for name, host in self._hosts.items():
             values = host.state(whole=False).values
-            for command in commands_of(name, type(host.served)):
-                for keys in _keys(values, command.place.parts, command.place.keyed):
-                    yield self._command_channel(command, keys)
-            for at, kind in _plain_states(host.served, (name,)):
-                channel = _state_channel(kind)
-                self._states[at] = channel
-                yield self._prefix + _joined(at), channel
+            self._there[name] = _parts_there(name, host, values)
+            declared = list(self._declared(name, host, values))
+            self._of[name] = dict(declared)
+            for record, make in declared:
+                yield record, make()
             yield from self._special(name, values)
+
+    def _declared(
+        self, name: str, host: Host, values: Mapping[str, Any]
+    ) -> "Iterator[tuple[str, _Make]]":
+        """Yield the records of what an application declares, and how they are made."""
+        for command in commands_of(name, type(host.served)):
+            for keys in _keys(values, command.place.parts, command.place.keyed):
+                parts, keyed = command.place.parts, command.place.keyed
+                at = (name, *_steps(parts, keyed, keys), command.declared.name)
+                yield self._prefix + _joined(at), partial(self._command_channel, command, keys)
+        for at, kind in _plain_states(host.served, (name,)):
+            yield self._prefix + _joined(at), partial(self._state_record, at, kind)
+
+    def _state_record(self, at: tuple[str, ...], kind: Any) -> Channel:
+        self._states[at] = _state_channel(kind)
+        return self._states[at]
+
+    def _follow_parts(self, name: str, values: Mapping[str, Any]) -> None:
+        """Add the records of parts that have come, such as players, and end those that are gone."""
+        host = self._hosts[name]
+        there = _parts_there(name, host, values)
+        if there == self._there[name]:
+            return
+        before, now = self._of[name], dict(self._declared(name, host, values))
+        gone = {each for each in before if each not in now}
+        self._states = {
+            at: each
+            for at, each in self._states.items()
+            if at[0] != name or self._prefix + _joined(at) not in gone
+        }
+        come = {each: make() for each, make in now.items() if each not in before}
+        self._server.change(come, gone)
+        self._there[name], self._of[name] = there, now
 
     def _special(self, name: str, values: Mapping[str, Any]) -> Iterator[tuple[str, Channel]]:
         for axis, held in values.get("axes", {}).items() if name == "mico" else ():
@@ -167,7 +208,7 @@ class EpicsGateway:
             self._images[camera] = ImageRecord(base, camera, kind)
             yield from self._images[camera].channels.items()
 
-    def _command_channel(self, command: Command, keys: tuple[str, ...]) -> tuple[str, Channel]:
+    def _command_channel(self, command: Command, keys: tuple[str, ...]) -> Channel:
         async def put(who: Who, said: str) -> None:
             channel = made
             try:
@@ -184,8 +225,7 @@ class EpicsGateway:
             await _answer(channel, {"result": to_json(result)})
 
         made = ca.text("{}", put=put)
-        steps = [command.place.application, *_steps(command.place.parts, command.place.keyed, keys)]
-        return self._prefix + _joined((*steps, command.declared.name)), made
+        return made
 
     # Commands
 
@@ -358,6 +398,7 @@ class EpicsGateway:
             await self._images[payload.camera].show(payload)
 
     async def _show_state(self, application: str, values: Mapping[str, Any]) -> None:
+        self._follow_parts(application, values)
         if application == "mico":
             for axis, motor in self._motors.items():
                 held = values["axes"].get(axis)
@@ -365,7 +406,7 @@ class EpicsGateway:
                     await motor.show(held["_latest"])
                 if values["stop_state"].reason is None:
                     await motor.forget("STOPPED")
-        for at, channel in self._states.items():
+        for at, channel in list(self._states.items()):
             if at[0] != application:
                 continue
             value: Any = values
@@ -400,6 +441,12 @@ async def _ended(operation: Operation[Any]) -> None:
 async def _answer(channel: Channel, said: dict[str, Any]) -> None:
     coded = json.dumps(said)
     await channel.write(coded if len(coded) < ca.JSON_LENGTH else '{"result": "too large"}')
+
+
+def _parts_there(name: str, host: Host, values: Mapping[str, Any]) -> object:
+    """Return which objects of an application there are."""
+    places = places_of(name, type(host.served))
+    return {(each.parts, tuple(_keys(values, each.parts, each.keyed))) for each in places}
 
 
 def _plain(name: str) -> str:

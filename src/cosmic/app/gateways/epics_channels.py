@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
@@ -297,6 +297,13 @@ class ChannelServer(WorkerThread):
     def problem(self) -> str:
         """Why it does not listen; empty while it does."""
         return self._problem
+
+    def change(self, come: Mapping[str, Channel], gone: Iterable[str]) -> None:
+        """Serve more channels, and others no longer to whom asks for them; in the loop."""
+        for name in gone:
+            self._channels.pop(name, None)
+        for name, channel in come.items():
+            self._channels.setdefault(name, channel)
 
     @override
     def run_body(self) -> None:
