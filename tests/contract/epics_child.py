@@ -36,7 +36,7 @@ def _main(port: str) -> None:
             data = value.encode() if isinstance(value, str) else [value]
             answer = pv.write(data, wait=True, timeout=20).status.success
         elif operation == "begin":
-            pv.write([value], wait=False)
+            pv.write(value if isinstance(value, list) else [value], wait=False)
             answer = None
         else:
             found = pv.read(data_type="control" if operation == "control" else "time")

@@ -20,7 +20,7 @@ from contract.station_rig import free_port, wait_until
 from cosmic.app.configuration.gateways import Doors, EpicsSettings, HttpSettings
 from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.epics import EpicsGateway
-from cosmic.frame.declaration import state
+from cosmic.frame.declaration import command, state
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import Failure, FailurePolicy
 from cosmic.frame.network.host import Host
@@ -242,6 +242,22 @@ def test_two_things_that_would_be_one_record_are_named() -> None:
     with pytest.raises(ConfigError, match="T:cabinet:drawers:left_x:"):
         EpicsGateway(station, {"cabinet": host}, EpicsSettings(prefix="T:", port=free_port()))
     host.close()
+
+
+def test_what_keeps_a_motion_alive_does_not_end_it() -> None:
+    class Jogged(Cabinet):
+        @command(moves=True, renews=True)
+        def renew(self) -> None:
+            """Keep what travels alive."""
+
+    with opened(Jogged) as door, used(door) as client, used(door) as other:
+        assert client.put("T:control", 1)
+        client.ask("begin", "T:cabinet:travel", list(b"{}"))
+        assert wait_until(lambda: bool(door.home.tasks))
+        assert client.put("T:cabinet:renew", "{}")
+        assert not door.home.tasks[0].done
+        assert other.put("T:cabinet:stop", "{}")
+        assert wait_until(lambda: door.home.tasks[0].done)
 
 
 def test_a_gateway_that_only_shows_still_lets_everybody_stop() -> None:

@@ -19,6 +19,7 @@ from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.session import GatewaySession
 from cosmic.app.platform import build_platform
 from cosmic.frame.audit import read_entries
+from cosmic.frame.declaration import command
 from cosmic.frame.errors import MoveRefused
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.errors import CallRefused
@@ -176,12 +177,18 @@ def test_every_door_of_a_station_is_named_with_verdict_and_reason(tmp_path: Path
     assert ("station", "right to move", "done") in told
 
 
+class Jogged(Cabinet):
+    @command(moves=True, renews=True)
+    def renew(self) -> None:
+        """Keep what travels alive."""
+
+
 @pytest.fixture
 def station(tmp_path: Path) -> Iterator[tuple[Station, Approvals, Path]]:
     """A station whose trail is written, with approvals and nothing that moves."""
     platform = build_platform(applications=("daqco",))
     approvals = Approvals(platform.policy)
-    home, path = Cabinet(), tmp_path / "audit.jsonl"
+    home, path = Jogged(), tmp_path / "audit.jsonl"
     host = Host("cabinet", home)
     try:
         with PlatformAudit(platform, path) as audit:
@@ -216,6 +223,22 @@ def test_what_a_person_approves_and_refuses_is_in_the_trail(
     assert [each["verdict"] for each in decided] == ["done", "refused"]
     assert {each["details"]["for"] for each in decided} == {"notebook"}
     assert decided[0]["details"]["command"] == "cabinet.drawers.move"
+
+
+def test_what_is_kept_alive_is_not_written_each_time(
+    station: tuple[Station, Approvals, Path],
+) -> None:
+    made, _, path = station
+    client = GatewaySession(made, "notebook", Access.MOVE, door="http")
+    with pytest.raises(MoveRefused):
+        client.carry_out(client.order("cabinet", "renew", {}))
+    client.take_control()
+    for _ in range(20):
+        client.carry_out(client.order("cabinet", "renew", {}))
+    client.carry_out(client.order("cabinet", "lock", {"code": 7}))
+    client.close()
+    entries = [each for each in written(path, "cabinet.lock") if each["what"] == "cabinet.renew"]
+    assert [each["verdict"] for each in entries] == ["refused"]
 
 
 def test_who_may_not_command_is_in_the_trail_and_a_flood_does_not_fill_it(

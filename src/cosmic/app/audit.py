@@ -90,8 +90,9 @@ class PlatformAudit:
 
     def _taker(self, application: str) -> Callable[[Ended], None]:
         def take(ended: Ended) -> None:
-            if ended.found.mark.reads:
-                return
+            mark = ended.found.mark
+            if mark.reads or (mark.renews and ended.error is None):
+                return  # a jog is kept alive many times a second
             caller, what = ended.caller, f"{application}.{ended.found.name}"
             said = _said(ended.arguments)
             goes_on = ended.goes_on

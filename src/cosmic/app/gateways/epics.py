@@ -271,7 +271,7 @@ class EpicsGateway:
         job = queue.submit(lambda: session.carry_out(order), order.title)
         await _ended(job)
         result = job.result
-        if order.found.mark.at_once:
+        if order.found.mark.at_once and not order.found.mark.renews:
             self._take_back(application, keys)
         if isinstance(result, Operation):
             going = self._going.setdefault((application, keys), [])

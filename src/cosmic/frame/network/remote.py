@@ -15,12 +15,13 @@ _MARK: Final = "__cosmic_remote__"
 
 @dataclass(frozen=True, slots=True)
 class RemoteMark:
-    """What `remote` said of a function."""
+    """What `remote` said of a function; `renews`: it only keeps alive what was begun before."""
 
     moves: bool
     reads: bool
     at_once: bool
     limit_s: float
+    renews: bool = False
 
 
 @overload
