@@ -21,7 +21,7 @@ SMALLEST_STEP: Final = 0.001
 """What `MRES` and the deadband say, in units of the axis."""
 
 HELD_WITHIN: Final = {"um": 0.5, "deg": 0.005}
-"""So near its target a closed loop holds an axis; one that is elsewhere was moved by others."""
+"""So near its target a closed loop holds an axis; one farther off was moved by others."""
 
 Run = Callable[[Who, str, dict[str, Any], tuple[str, ...]], Awaitable[Any]]
 """`run(who, function, arguments, keys)` carries out a command of MiCo and awaits its end."""
@@ -138,7 +138,7 @@ class MotorRecord:
             await self._show_state(found)
         moved, self._in_motion = self._in_motion, found.in_motion
         if not self._moves:
-            if not found.in_motion and (moved or self._is_elsewhere(found)):
+            if not found.in_motion and (moved or self._left_its_target(found)):
                 await self._rest(found)  # somebody else moved it
             await self._show_moving()
 
@@ -166,7 +166,7 @@ class MotorRecord:
             bounds = _within((low - zero, high - zero))
             await ca.show(self._fields[field], self._target - zero, ca.NO_ALARM, **bounds)
 
-    def _is_elsewhere(self, state: PositionerState) -> bool:
+    def _left_its_target(self, state: PositionerState) -> bool:
         there = state.position
         return there is not None and abs(there - self._target) > HELD_WITHIN[self._unit]
 
