@@ -6,6 +6,7 @@ Run as ``python epics_child.py PORT``; each line is ``[operation, name, value]``
 import json
 import os
 import sys
+from contextlib import suppress
 
 
 def _main(port: str) -> None:
@@ -14,11 +15,19 @@ def _main(port: str) -> None:
         "EPICS_CA_ADDR_LIST": "127.0.0.1",
         "EPICS_CA_AUTO_ADDR_LIST": "NO",
     }
+    from caproto import CaprotoTimeoutError
     from caproto.threading.client import Context
 
     context, known = Context(), {}
     for said in sys.stdin:
         operation, name, value = json.loads(said)
+        if operation == "find":
+            (found,) = context.get_pvs(name)
+            with suppress(CaprotoTimeoutError):
+                found.wait_for_connection(timeout=float(value))
+            sys.stdout.write(json.dumps(found.connected) + "\n")
+            sys.stdout.flush()
+            continue
         if name not in known:
             (known[name],) = context.get_pvs(name)
             known[name].wait_for_connection(timeout=10)
@@ -27,7 +36,7 @@ def _main(port: str) -> None:
             data = value.encode() if isinstance(value, str) else [value]
             answer = pv.write(data, wait=True, timeout=20).status.success
         elif operation == "begin":
-            pv.write([value], wait=False)
+            pv.write(value if isinstance(value, list) else [value], wait=False)
             answer = None
         else:
             found = pv.read(data_type="control" if operation == "control" else "time")

@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -14,16 +15,19 @@ from typing import Any
 
 import pytest
 
-from contract.cabinet import Cabinet, WithBell
+from contract.cabinet import Cabinet, Colour, Lamp, WithBell
 from contract.station_rig import free_port, wait_until
 from cosmic.app.configuration.gateways import Doors, EpicsSettings, HttpSettings
 from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.epics import EpicsGateway
+from cosmic.frame.declaration import command, state
+from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import Failure, FailurePolicy
 from cosmic.frame.network.host import Host
 from cosmic.frame.network.station import Station
 
 CHILD = Path(__file__).with_name("epics_child.py")
+INVALID = 3
 
 
 class Client:
@@ -125,6 +129,135 @@ def test_what_moves_needs_the_right_and_ends_with_the_client() -> None:
             assert wait_until(lambda: dead_man.expired, 1.0)
             assert wait_until(lambda: door.station.lease.state.local)
         assert not door.failures
+
+
+def test_a_client_that_is_frozen_and_wants_to_be_watched_loses_the_right() -> None:
+    with opened() as door, used(door) as client:
+        assert client.put("T:control", 2)
+        assert client.put("T:cabinet:drawers:left_x:move", '{"target_um": 5.0}')
+        dead_man = door.home.drawers["left.x"].dead_men[-1]
+        client.process.send_signal(signal.SIGSTOP)
+        assert not dead_man.expired
+        assert wait_until(lambda: dead_man.expired, 1.5), "what moves bears 1 s of silence"
+        assert wait_until(lambda: door.station.lease.state.local, 1.5)
+        client.process.send_signal(signal.SIGCONT)
+        assert not client.put("T:cabinet:drawers:left_x:move", '{"target_um": 6.0}')
+        assert door.home.drawers["left.x"].moved_um == [5.0]
+
+
+def test_whatever_a_watched_client_says_keeps_what_moves() -> None:
+    with opened() as door, used(door) as client:
+        assert client.put("T:control", 1)
+        assert client.put("T:control", 2)
+        assert client.put("T:cabinet:drawers:left_x:move", '{"target_um": 5.0}')
+        dead_man = door.home.drawers["left.x"].dead_men[-1]
+        until_s = time.monotonic() + 1.3
+        while time.monotonic() < until_s:
+            assert client.get("T:control") == 1.0
+        assert not dead_man.expired
+
+
+def test_a_right_that_is_not_given_has_its_reason() -> None:
+    with opened() as door, used(door) as client, used(door) as other:
+        assert client.put("T:control", 1)
+        assert not other.put("T:control", 1)
+        assert "held by EPICS" in other.get("T:control:reason")
+        assert not client.put("T:control", -3)
+        assert "seconds of silence" in client.get("T:control:reason")
+        assert client.put("T:control", 0)
+        assert other.put("T:control", 1)
+        assert other.get("T:control:reason") == ""
+
+
+def test_a_state_is_a_record_with_its_fields_and_says_when_nobody_knows_it() -> None:
+    class Bench(Cabinet):
+        def __init__(self) -> None:
+            super().__init__()
+            self.focus: float | None = None
+            self.count = 2**40
+
+        @property
+        @state
+        def focus_um(self) -> float | None:
+            return self.focus
+
+        @property
+        @state
+        def frames(self) -> int:
+            return self.count
+
+        @property
+        @state
+        def tools(self) -> tuple[str, ...]:
+            return ("tip",)
+
+        def know(self, focus: float | None, count: int) -> None:
+            self.focus, self.count = focus, count
+            self.note_change()
+
+    with opened(Bench) as door, used(door) as client:
+        assert isinstance(door.home, Bench)
+        assert wait_until(lambda: client.get("T:cabinet:lamp:shown:colour") == "red")
+        door.home.lamp.shine(Colour.GREEN, level=0.5)
+        assert wait_until(lambda: client.get("T:cabinet:lamp:shown:colour") == "green")
+        assert client.get("T:cabinet:lamp:shown:level") == 0.5
+        for name in ("focus_um", "frames"):
+            assert wait_until(lambda name=name: client.ask("alarm", f"T:cabinet:{name}") == INVALID)
+        door.home.know(3.5, 7)
+        assert wait_until(lambda: client.get("T:cabinet:focus_um") == 3.5)
+        assert client.ask("alarm", "T:cabinet:focus_um") == 0
+        assert client.get("T:cabinet:frames") == 7
+        door.home.know(None, 8)
+        assert wait_until(lambda: client.ask("alarm", "T:cabinet:focus_um") == INVALID)
+        assert client.ask("find", "T:cabinet:frames", 10)
+        assert not client.ask("find", "T:cabinet:tools", 0.5), "a list is no text"
+
+
+def test_parts_that_come_and_go_are_records_as_well() -> None:
+    with opened() as door, used(door) as client:
+        assert client.put("T:control", 1)
+        door.home.put_in("low")
+        door.home.fit(Lamp())
+        time.sleep(0.3)  # a client that searched in vain is slow to search again
+        assert client.ask("find", "T:cabinet:drawers:low:move", 10)
+        assert client.put("T:cabinet:drawers:low:move", '{"target_um": 5.0}')
+        assert door.home.drawers["low"].moved_um == [5.0]
+        assert wait_until(lambda: client.get("T:cabinet:drawers:low:position_um") == 5.0)
+        assert client.put("T:cabinet:spare:shine", '{"colour": "green"}')
+        assert client.put("T:cabinet:drawers:left_x:move", '{"target_um": 6.0}')
+        door.home.take_out("low")
+        assert not client.put("T:cabinet:drawers:low:move", '{"target_um": 7.0}')
+        assert "there is no 'low'" in client.get("T:cabinet:drawers:low:move")
+        with used(door) as later:
+            assert wait_until(
+                lambda: not later.ask("find", "T:cabinet:drawers:low:position_um", 0.2)
+            )
+
+
+def test_two_things_that_would_be_one_record_are_named() -> None:
+    home = Cabinet()
+    home.put_in("left_x")  # beside "left.x"
+    station, host = Station("fibres", FailurePolicy()), Host("cabinet", home)
+    station.host("cabinet", host)
+    with pytest.raises(ConfigError, match="T:cabinet:drawers:left_x:"):
+        EpicsGateway(station, {"cabinet": host}, EpicsSettings(prefix="T:", port=free_port()))
+    host.close()
+
+
+def test_what_keeps_a_motion_alive_does_not_end_it() -> None:
+    class Jogged(Cabinet):
+        @command(moves=True, renews=True)
+        def renew(self) -> None:
+            """Keep what travels alive."""
+
+    with opened(Jogged) as door, used(door) as client, used(door) as other:
+        assert client.put("T:control", 1)
+        client.ask("begin", "T:cabinet:travel", list(b"{}"))
+        assert wait_until(lambda: bool(door.home.tasks))
+        assert client.put("T:cabinet:renew", "{}")
+        assert not door.home.tasks[0].done
+        assert other.put("T:cabinet:stop", "{}")
+        assert wait_until(lambda: door.home.tasks[0].done)
 
 
 def test_a_gateway_that_only_shows_still_lets_everybody_stop() -> None:

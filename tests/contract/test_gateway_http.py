@@ -3,11 +3,15 @@
 import json
 import socket
 import ssl
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 import httpx
@@ -24,6 +28,7 @@ from cosmic.app.gateways.http import HttpGateway
 from cosmic.app.gateways.http_server import BODY_LIMIT_BYTES, listening
 from cosmic.app.gateways.openapi import mcp_tools
 from cosmic.app.panels.approvals import ApprovalsPanel
+from cosmic.frame.declaration import command
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import Failure, FailurePolicy
 from cosmic.frame.network.certificates import make_certificates
@@ -31,6 +36,7 @@ from cosmic.frame.network.host import Host
 from cosmic.frame.network.line_settings import Certificates
 from cosmic.frame.network.station import Station
 
+BROWSER = Path(__file__).with_name("browser_child.py")
 TOKENS = {"move": "m" * 20, "call": "c" * 20, "view": "v" * 20}
 
 
@@ -46,9 +52,11 @@ class Door:
         return httpx.Client(base_url=self.address, headers=headers, timeout=20.0, **more)
 
     @contextmanager
-    def line(self, access: str = "move", follow: tuple[str, ...] = ()) -> Iterator[Any]:
+    def line(
+        self, access: str = "move", follow: tuple[str, ...] = (), **more: Any
+    ) -> Iterator[Any]:
         with connect(self.address.replace("http", "ws") + "/api/events", proxy=None) as made:
-            made.send(json.dumps({"token": TOKENS[access], "follow": list(follow)}))
+            made.send(json.dumps({"token": TOKENS[access], "follow": list(follow)} | more))
             assert json.loads(made.recv(5.0))["topic"] == "hello"
             yield made
 
@@ -123,6 +131,10 @@ def test_an_assistant_uses_the_same_commands_over_mcp(door: Door) -> None:
         http.post("/api/control")
         assert said("tools/call", **move)["result"]["content"][0]["text"] == "4.0"
         assert said("tools/call", name="cabinet_emit", arguments={})["error"]["code"] == -32602
+        for tool, wrong in (("take_control", "keep_s"), ("follow_operation", "wait_s")):
+            for value in (None, "soon", [], True, -1):
+                refused = said("tools/call", name=tool, arguments={wrong: value})["error"]
+                assert refused["message"].startswith(f"{wrong}: a number of seconds")
         assert said("nothing")["error"]["code"] == -32601
         notice = {"jsonrpc": "2.0", "method": "notifications/initialized"}
         assert http.post("/mcp", json=notice).status_code == 202
@@ -141,6 +153,12 @@ def test_what_moves_needs_the_right_and_goes_through_the_lease(door: Door) -> No
         assert http.get("/api/cabinet/state/drawers/left.x/position_um").json() == 5.0
         http.delete("/api/control")
         assert door.station.lease.state.local
+
+
+def test_what_a_command_takes_is_said_in_its_own_names(door: Door) -> None:
+    with door.client() as http:
+        said = http.post("/api/cabinet/drawers/top/move", json={}).json()["error"]["text"]
+    assert said == "drawers.move takes target_um; unknown: none, missing: target_um"
 
 
 def test_settings_and_words_come_as_json(door: Door) -> None:
@@ -166,6 +184,57 @@ def test_what_goes_on_is_followed_and_ended(door: Door) -> None:
         door.home.tasks[0].finish()
         assert http.get(where, params={"wait": 5}).json()["done"] is True
         assert http.get("/api/operations/999").status_code == 404
+
+
+def test_a_wait_that_makes_no_sense_is_refused_before_anything_moves(door: Door) -> None:
+    with door.client() as http:
+        http.post("/api/control")
+        path = "/api/cabinet/drawers/left.x/move"
+        for wait in ("61", "-1", "nan", "soon"):
+            refused = http.post(path, params={"wait": wait}, json={"target_um": 5.0})
+            assert refused.status_code == 400
+            assert "wait" in refused.json()["error"]["text"]
+        assert door.home.drawers["left.x"].moved_um == []
+
+
+class Busy(Cabinet):
+    """The cabinet with a command that takes until `over` is set."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.begun, self.over = Event(), Event()
+
+    @command(timeout_s=0.1)
+    def toil(self) -> None:
+        self.begun.set()
+        self.over.wait(20.0)
+
+
+@pytest.mark.parametrize("patient", [True, False], ids=["refused", "hung up"])
+def test_a_command_whose_turn_did_not_come_is_not_carried_out_later(*, patient: bool) -> None:
+    with opened(Busy) as door, door.client() as http, door.client("call") as other:
+        home = door.home
+        assert isinstance(home, Busy)
+        toiling = Thread(target=lambda: other.post("/api/cabinet/toil", json={}))
+        toiling.start()
+        assert home.begun.wait(10.0)
+        http.post("/api/control")
+        try:
+            with nullcontext() if patient else suppress(httpx.ReadTimeout):
+                refused = http.post(
+                    "/api/cabinet/drawers/left.x/move",
+                    json={"target_um": 5.0},
+                    timeout=20.0 if patient else 0.3,
+                )
+                assert refused.status_code == 503
+                assert "was not carried out" in refused.json()["error"]["text"]
+            time.sleep(0.5)  # until it is noticed
+            http.post("/api/control")
+        finally:
+            home.over.set()
+            toiling.join(10.0)
+        assert http.post("/api/cabinet/lamp/shine", json={"colour": "green"}).is_success
+        assert door.home.drawers["left.x"].moved_um == []
 
 
 def test_who_hangs_up_while_waiting_ends_what_was_begun(door: Door) -> None:
@@ -202,6 +271,25 @@ def test_a_client_that_is_gone_leaves_nothing_moving(door: Door) -> None:
         line.socket.shutdown(socket.SHUT_RDWR)
         assert wait_until(lambda: dead_man.expired, 1.0)
         assert door.station.lease.state.local
+
+
+def test_a_line_that_only_looks_keeps_nothing_moving_for_another_program(door: Door) -> None:
+    with door.client() as http, door.line(looks_only=True), door.line(looks_only=True):
+        http.post("/api/control")
+        http.post("/api/cabinet/drawers/top/move", json={"target_um": 1.0})
+        dead_man = door.home.drawers["top"].dead_men[0]
+        assert wait_until(lambda: dead_man.expired, 1.5)
+        assert wait_until(lambda: door.station.lease.state.local, 1.0)
+        http.post("/api/control")
+        with door.line() as line:
+            line.send(json.dumps({"follow": ["cabinet/state"]}))
+            assert json.loads(line.recv(5.0))["topic"] == "cabinet/state"
+        assert wait_until(lambda: door.station.lease.state.local, 0.8), "its own line has ended"
+
+
+def test_the_page_only_looks() -> None:
+    with opened() as door, door.client() as http:
+        assert "looks_only: true" in http.get("/").text
 
 
 def test_who_takes_over_ends_what_goes_on_for_a_client(door: Door) -> None:
@@ -340,6 +428,20 @@ def test_a_flood_of_one_client_is_held_back_and_a_stop_still_passes(
     assert not door.failures
 
 
+def test_whoever_asks_too_often_may_stop_all_the_same(
+    door: Door, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosmic.app.gateways.http.MOST_REQUESTS_S", 2.0)
+    with door.client("view") as http:
+        while http.get("/api/station").status_code != 429:
+            pass
+        assert http.post("/api/cabinet/stop", json={}).is_success
+        assert http.post("/api/cabinet/lamp/shine", json={}).status_code == 429
+        stops = [http.post("/api/cabinet/stop", json={}).status_code for _ in range(60)]
+        assert stops[-1] == 429, "a flood of stops is one as well"
+    assert door.home.stops > 10
+
+
 def test_raw_bytes_that_are_no_http_harm_nobody(door: Door) -> None:
     host, port = door.address.removeprefix("http://").split(":")
     for said in (b"\x00" * 1000, b"GET / HTTP/9\r\n\r\n", b"A" * 100_000, b"POST / HTTP/1.1\r\n"):
@@ -385,6 +487,38 @@ def test_answers_are_sent_without_waiting_for_an_acknowledgement() -> None:
         with came:
             # asyncio turns Nagle's delay off for what says that it is TCP, and for nothing else.
             assert came.proto == socket.IPPROTO_TCP
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    find_spec("PySide6.QtWebEngineWidgets") is None, reason="there is no browser of Qt here"
+)
+def test_the_page_comes_back_with_its_station() -> None:
+    client = HttpClient(name="desk", token=TOKENS["view"])
+    settings = HttpSettings(listen=f"127.0.0.1:{free_port()}", client=(client,))
+
+    @contextmanager
+    def served(platform: str) -> Iterator[None]:
+        station = Station("fibres", FailurePolicy())
+        about = {"platform": platform, "simulated": True, "applications": []}
+        gateway = HttpGateway(station, {}, settings, about)
+        try:
+            yield
+        finally:
+            gateway.close()
+
+    page = f"http://{settings.listen}/#token={client.token}"
+    with ExitStack() as at_end:
+        with served("the one before"):
+            command = [sys.executable, str(BROWSER), page, "the one after"]
+            browser = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+            at_end.callback(browser.communicate)
+            at_end.callback(browser.kill)
+            time.sleep(5.0)  # until it is shown
+        time.sleep(3.0)  # until it asked in vain
+        with served("the one after"):
+            said, _ = browser.communicate(timeout=45.0)
+    assert "the one after" in said
 
 
 def test_the_page_and_the_description_need_no_token(door: Door) -> None:

@@ -19,6 +19,7 @@ from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.session import GatewaySession
 from cosmic.app.platform import build_platform
 from cosmic.frame.audit import read_entries
+from cosmic.frame.declaration import command
 from cosmic.frame.errors import MoveRefused
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.errors import CallRefused
@@ -46,6 +47,18 @@ def trail(tmp_path: Path) -> Path:
             order = client.order("mico", "axes.begin", {"motion": motion}, ("left.x",))
             with pytest.raises(MoveRefused):
                 client.carry_out(order)
+            client.take_control(in_process=True)
+            other = GatewaySession(station, "guest", Access.MOVE, door="epics")
+            with pytest.raises(MoveRefused):
+                other.take_control()
+            far = {"kind": "MoveTo", "target": 1e6, "unit": "um"}
+            ends = [
+                client.carry_out(client.order("mico", "axes.begin", {"motion": each}, ("left.x",)))
+                for each in (motion, far)
+            ]
+            assert wait_until(lambda: all(each.done for each in ends))
+            client.release_control()
+            other.close()
             mico["left.x"].move_to(2.0)
             with pytest.raises(cosmic.MoveRefused):
                 mico["left.x"].move_to(1e6)
@@ -96,8 +109,20 @@ def test_every_command_stands_in_the_trail_and_can_be_found(
         return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
 
     assert len(listed()) == len(entries)
-    (refused,) = listed("--who", "notebook")
-    assert refused["why"].startswith("NO_LEASE")
+    own = [
+        (each["what"], each["verdict"], each.get("why", "").partition(":")[0])
+        for each in listed("--who", "notebook", "--door", "http")
+    ]
+    begin = "mico.axes.begin"
+    assert own[0] == (begin, "refused", "NO_LEASE")
+    assert sorted(set(own[1:])) == [
+        (begin, "begun", ""),
+        (begin, "done", ""),
+        (begin, "refused", "LIMIT"),
+    ]
+    (refused,) = listed("--who", "guest", "--what", "right to move")
+    assert refused["verdict"] == "refused"
+    assert "held by notebook" in refused["why"]
     assert {each["why"].partition(":")[0] for each in listed("--verdict", "refused")} == {
         "NO_LEASE",
         "LIMIT",
@@ -152,12 +177,18 @@ def test_every_door_of_a_station_is_named_with_verdict_and_reason(tmp_path: Path
     assert ("station", "right to move", "done") in told
 
 
+class Jogged(Cabinet):
+    @command(moves=True, renews=True)
+    def renew(self) -> None:
+        """Keep what travels alive."""
+
+
 @pytest.fixture
 def station(tmp_path: Path) -> Iterator[tuple[Station, Approvals, Path]]:
     """A station whose trail is written, with approvals and nothing that moves."""
     platform = build_platform(applications=("daqco",))
     approvals = Approvals(platform.policy)
-    home, path = Cabinet(), tmp_path / "audit.jsonl"
+    home, path = Jogged(), tmp_path / "audit.jsonl"
     host = Host("cabinet", home)
     try:
         with PlatformAudit(platform, path) as audit:
@@ -192,6 +223,22 @@ def test_what_a_person_approves_and_refuses_is_in_the_trail(
     assert [each["verdict"] for each in decided] == ["done", "refused"]
     assert {each["details"]["for"] for each in decided} == {"notebook"}
     assert decided[0]["details"]["command"] == "cabinet.drawers.move"
+
+
+def test_what_is_kept_alive_is_not_written_each_time(
+    station: tuple[Station, Approvals, Path],
+) -> None:
+    made, _, path = station
+    client = GatewaySession(made, "notebook", Access.MOVE, door="http")
+    with pytest.raises(MoveRefused):
+        client.carry_out(client.order("cabinet", "renew", {}))
+    client.take_control()
+    for _ in range(20):
+        client.carry_out(client.order("cabinet", "renew", {}))
+    client.carry_out(client.order("cabinet", "lock", {"code": 7}))
+    client.close()
+    entries = [each for each in written(path, "cabinet.lock") if each["what"] == "cabinet.renew"]
+    assert [each["verdict"] for each in entries] == ["refused"]
 
 
 def test_who_may_not_command_is_in_the_trail_and_a_flood_does_not_fill_it(

@@ -7,6 +7,7 @@ import random
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -202,6 +203,29 @@ def test_an_image_over_http_has_its_scale_and_time(served: Served) -> None:
         assert tif.asarray().shape == (1200, 1600)
         assert "AcquisitionDate" in tif.ome_metadata
         assert "left.x_um" in tif.ome_metadata
+
+
+@pytest.mark.skipif(
+    find_spec("PySide6.QtWebEngineWidgets") is None, reason="there is no browser of Qt here"
+)
+def test_the_page_shows_no_force_of_before(served: Served) -> None:
+    script = ROOT / "tests" / "contract" / "browser_child.py"
+    page = f"{str(served.http.base_url).rstrip('/')}/#token={served.token}"
+    browser = subprocess.Popen(
+        [sys.executable, str(script), page, "no samples"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    time.sleep(5.0)  # until it is shown
+    try:
+        assert served.http.post("/api/daqco/stop", json={}).is_success
+        said, _ = browser.communicate(timeout=45.0)
+    finally:
+        browser.kill()
+        browser.communicate()
+        served.http.post("/api/daqco/start", json={})
+    assert "no samples" in said
 
 
 def followed(page: str, served: Served, folder: Path, first: str = "", **words: str) -> None:

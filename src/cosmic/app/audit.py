@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
@@ -13,11 +14,15 @@ from cosmic.app.gateways.approvals import Approvals, Asked
 from cosmic.app.platform import Platform
 from cosmic.frame.audit import BEGUN, DONE, REFUSED, AuditEntry, AuditTrail, verdict_of
 from cosmic.frame.clock import WALL
+from cosmic.frame.errors import CosmicError
 from cosmic.frame.network.host import KEYS
 from cosmic.frame.network.invoker import Ended
 from cosmic.frame.network.lease import LeaseState
+from cosmic.frame.network.ongoing import Ended as OperationEnded
+from cosmic.frame.network.ongoing import Ongoing
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.travelling_errors import from_plain
+from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.news import AxisBegun, AxisEnded, AxisRefused, MovementNews
@@ -76,6 +81,7 @@ class PlatformAudit:
         """
         undo = ExitStack()
         undo.callback(station.lease.subscribe(self._on_lease))
+        undo.callback(station.lease.refused.subscribe(self._on_refused_lease))
         if approvals is not None:
             undo.callback(approvals.decided.subscribe(self._on_decision))
         for name, invoker in station.invokers.items():
@@ -84,22 +90,43 @@ class PlatformAudit:
 
     def _taker(self, application: str) -> Callable[[Ended], None]:
         def take(ended: Ended) -> None:
-            if ended.found.mark.reads:
-                return
-            verdict, why = verdict_of(ended.error)
-            what = f"{application}.{ended.found.name}"
+            mark = ended.found.mark
+            if mark.reads or (mark.renews and ended.error is None):
+                return  # a jog is kept alive many times a second
+            caller, what = ended.caller, f"{application}.{ended.found.name}"
             said = _said(ended.arguments)
-            if verdict == REFUSED:
-                left_out = self._refusals.admit(WALL.now_s())
-                if left_out is None:
-                    return
-                if left_out:
-                    said["left_out"] = f"{left_out} refusals before this one"
-            self._trail.note(
-                AuditEntry(ended.caller.name, ended.caller.door, what, verdict, why, said)
-            )
+            goes_on = ended.goes_on
+            if goes_on is None:
+                verdict, why = verdict_of(ended.error)
+                self._note(AuditEntry(caller.name, caller.door, what, verdict, why, said))
+                return
+
+            def note_end(over: Ongoing) -> None:
+                verdict, why = verdict_of(_failure(over))
+                self._note(AuditEntry(caller.name, caller.door, what, verdict, why, said))
+
+            if not goes_on.done:
+                self._note(AuditEntry(caller.name, caller.door, what, BEGUN, "", said))
+            add_callback = getattr(goes_on, "add_callback", None)
+            if add_callback is not None:
+                add_callback(note_end)
 
         return take
+
+    def _note(self, entry: AuditEntry) -> None:
+        """Write what a client commanded; of refusals so many a second."""
+        if entry.verdict == REFUSED:
+            left_out = self._refusals.admit(WALL.now_s())
+            if left_out is None:
+                return
+            if left_out:
+                more = {"left_out": f"{left_out} refusals before this one"}
+                entry = replace(entry, details={**entry.details, **more})
+        self._trail.note(entry)
+
+    def _on_refused_lease(self, name: str, verdict: MoveVerdict) -> None:
+        why = f"{verdict.reason.name}: {verdict}"
+        self._note(AuditEntry(name, STATION, "right to move", REFUSED, why))
 
     def _on_lease(self, found: LeaseState) -> None:
         self._trail.note(AuditEntry(found.holder, STATION, "right to move", DONE, found.why))
@@ -137,6 +164,16 @@ class PlatformAudit:
     def _end(self) -> None:
         self._trail.request_end()
         self._trail.join()
+
+
+def _failure(over: Ongoing) -> Exception | None:
+    """Return what a command failed with that has ended."""
+    try:
+        end = over.wait(0.0)
+    except CosmicError as exc:
+        return exc
+    plain = end.error if isinstance(end, OperationEnded) else None
+    return None if plain is None else from_plain(plain)
 
 
 class _Refusals:

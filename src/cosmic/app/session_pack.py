@@ -7,15 +7,20 @@ import zipfile
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from io import BytesIO
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, BinaryIO, Final
+from urllib.parse import quote
 
 from cosmic.daqco.core.unclosed_file import is_unclosed
+from cosmic.frame.config import without_tokens
 from cosmic.frame.errors import RecordingError, RecordingExistsError
 from cosmic.frame.version import __version__
 
 METADATA: Final = "ro-crate-metadata.json"
 _PIECE_BYTES: Final = 1024 * 1024
+_LARGEST_KEY: Final = 100_000
+"""Bytes; no file with a private key is larger."""
 _KINDS: Final = {
     ".h5": ("application/x-hdf5", "recording: samples, physical values and positions"),
     ".mkv": ("video/x-matroska", "images"),
@@ -42,16 +47,22 @@ class Packed:
         Of all files together, before they were packed.
     unclosed : tuple of Path
         Recordings that are cut off or were not closed by their writer, packed as they are.
+    left_out : tuple of Path
+        Files with private keys: who has them could command the platform.
     """
 
     path: Path
     files: int
     size_bytes: int
     unclosed: tuple[Path, ...] = ()
+    left_out: tuple[Path, ...] = ()
 
 
 def pack_session(sources: Iterable[Path], target: Path, *, name: str = "") -> Packed:
     """Write files, and all that is in folders, into one zip file with its description.
+
+    A session is made to be given away: private keys stay, and tokens in configuration files are
+    left empty.
 
     Parameters
     ----------
@@ -67,7 +78,10 @@ def pack_session(sources: Iterable[Path], target: Path, *, name: str = "") -> Pa
     RecordingError
         A source is not there, two have the same name, or the file cannot be written.
     """
-    found = dict(_named(sources))
+    named = dict(_named(sources))
+    keys = [inside for inside, path in named.items() if _is_key(path)]
+    left_out = tuple(named.pop(inside) for inside in keys)
+    found = named
     if not found:
         raise RecordingError("there is nothing to pack")
     if target.exists():
@@ -88,7 +102,7 @@ def pack_session(sources: Iterable[Path], target: Path, *, name: str = "") -> Pa
     except OSError as exc:
         part.unlink(missing_ok=True)
         raise RecordingError(f"{target}: cannot be written ({exc.strerror or exc})") from exc
-    return Packed(target, len(found), size_bytes, tuple(unclosed))
+    return Packed(target, len(found), size_bytes, tuple(unclosed), left_out)
 
 
 def _named(sources: Iterable[Path]) -> Iterator[tuple[str, Path]]:
@@ -109,11 +123,24 @@ def _named(sources: Iterable[Path]) -> Iterator[tuple[str, Path]]:
             yield inside, path
 
 
+def _is_key(path: Path) -> bool:
+    small = path.stat().st_size <= _LARGEST_KEY
+    return small and b"PRIVATE KEY-----" in path.read_bytes()
+
+
+def _opened(path: Path) -> BinaryIO:
+    """Return what is packed of a file: all but tokens."""
+    if path.suffix.lower() != ".toml":
+        return path.open("rb")
+    text = path.read_bytes().decode("utf-8", "surrogateescape")
+    return BytesIO(without_tokens(text).encode("utf-8", "surrogateescape"))
+
+
 def _packed(file: zipfile.ZipFile, inside: str, path: Path) -> dict[str, Any]:
     """Write one file and return how it is described: what was written, though it may still grow."""
     digest, size_bytes = hashlib.sha256(), 0
     changed = datetime.fromtimestamp(path.stat().st_mtime, UTC)
-    with path.open("rb") as source, file.open(inside, "w", force_zip64=True) as sink:
+    with _opened(path) as source, file.open(inside, "w", force_zip64=True) as sink:
         while piece := source.read(_PIECE_BYTES):
             digest.update(piece)
             size_bytes += len(piece)
@@ -121,7 +148,7 @@ def _packed(file: zipfile.ZipFile, inside: str, path: Path) -> dict[str, Any]:
     guessed = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
     form, what = _KINDS.get(path.suffix.lower(), (guessed, ""))
     entity: dict[str, Any] = {
-        "@id": inside,
+        "@id": quote(inside),  # an address, so that spaces and # are coded
         "@type": "File",
         "name": path.name,
         "contentSize": str(size_bytes),

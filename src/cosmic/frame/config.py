@@ -1,9 +1,10 @@
 """Strict configuration: TOML read once at start into frozen models, every error named."""
 
+import re
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
@@ -11,6 +12,11 @@ from pydantic_core import ErrorDetails
 from cosmic.frame.errors import ConfigError
 
 M = TypeVar("M", bound="StrictModel")
+
+_TOKEN: Final = re.compile(
+    r"""(\btoken["']?\s*=\s*)(?:"{3}.*?"{3}|'{3}.*?'{3}|"(?:\\.|[^"\\\n])*"|'[^'\n]*')""",
+    re.DOTALL,
+)
 
 
 class StrictModel(BaseModel):
@@ -42,6 +48,11 @@ def user_file(name: str, folder: Path | None) -> Path | None:
 def not_there(what: str, name: str, known: Iterable[str]) -> str:
     """Return what is said of a name that nothing has, with those that there are."""
     return f"there is no {what} {name!r}; there are {', '.join(known) or 'none'}"
+
+
+def without_tokens(text: str) -> str:
+    """Return TOML with empty tokens, to be kept where others read it; comments lose theirs too."""
+    return _TOKEN.sub(r'\1""', text)
 
 
 def read_toml(path: Path) -> dict[str, object]:

@@ -10,7 +10,7 @@ from caproto import CAStatus
 from cosmic.app.gateways import epics_channels as ca
 from cosmic.app.gateways.epics_channels import Who
 from cosmic.app.gateways.epics_motor import MotorRecord
-from cosmic.frame.errors import refusal
+from cosmic.frame.errors import CosmicError, refusal
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.hw.interface import Channel, PositionerKind
@@ -29,6 +29,8 @@ class Commander:
     def __init__(self) -> None:
         self.looks = 0
         self.runs = 0
+        self.refused: CosmicError | None = None
+        self.state = STATE
         self.arrive = asyncio.Event()
 
     async def run(
@@ -38,18 +40,20 @@ class Commander:
         if who != HOLDER:
             raise refusal(refuse(Reason.NO_LEASE, "the right to move is held by holder"))
         await self.arrive.wait()
+        if self.refused is not None:
+            raise self.refused
 
     async def look(self, _axis: str) -> PositionerState:
         self.looks += 1
-        return STATE
+        return self.state
 
     def may_move(self, who: Who) -> bool:
         return who == HOLDER
 
 
-async def put(record: MotorRecord, who: Who, value: float) -> bool:
-    """Write to VAL as the server does; False where it was refused."""
-    channel = record.channels["R"]
+async def put(record: MotorRecord, who: Who, value: float, field: str = "VAL") -> bool:
+    """Write to a field as the server does; False where it was refused."""
+    channel = record.channels[f"R.{field}"]
     status = await channel.auth_write(
         who.host, who.user, [value], channel.data_type, None, user_address=who.address
     )
@@ -127,5 +131,80 @@ def test_an_older_state_that_is_slow_to_write_takes_no_newer_alarm_away() -> Non
         assert not await put(record, STRANGER, 5.0)
         await older
         assert (channel.alarm.status, channel.alarm.severity) == ca.ALARMS["NO_LEASE"]
+
+    with_record(act)
+
+
+def values(record: MotorRecord, *names: str) -> list[float]:
+    return [float(record.channels[f"R.{name}"].value) for name in names]
+
+
+def test_a_setpoint_follows_an_axis_that_others_moved() -> None:
+    async def act(record: MotorRecord, _commander: Commander) -> None:
+        await record.show(replace(STATE, position=20.0, in_motion=True))
+        assert values(record, "VAL", "DVAL") == [0.0, 0.0]
+        await record.show(replace(STATE, position=30.0))
+        assert values(record, "VAL", "DVAL") == [30.0, 30.0]
+        await record.show(replace(STATE, position=33.0))  # too fast to be seen in motion
+        assert values(record, "VAL", "DVAL") == [33.0, 33.0]
+        await record.show(replace(STATE, position=33.2))  # held there
+        assert values(record, "VAL", "DVAL") == [33.0, 33.0]
+
+    with_record(act)
+
+
+def test_a_setpoint_is_where_the_axis_rests_after_a_stop_and_after_a_refusal() -> None:
+    async def act(record: MotorRecord, commander: Commander) -> None:
+        commander.arrive.set()
+        commander.refused = refusal(refuse(Reason.STOPPED, "stopped"))
+        commander.state = replace(STATE, position=7.0)
+        assert not await put(record, HOLDER, 60.0)
+        assert values(record, "VAL", "DVAL") == [7.0, 7.0]
+        commander.refused = None
+        commander.state = replace(STATE, position=59.9)
+        assert await put(record, HOLDER, 60.0, "DVAL")
+        assert values(record, "VAL", "DVAL", "RBV") == [60.0, 60.0, 59.9]
+        commander.state = replace(STATE, position=64.8)
+        assert await put(record, HOLDER, 5.0, "RLV")
+        assert values(record, "VAL", "DVAL") == [64.8, 64.8]
+
+    with_record(act)
+
+
+def test_setpoint_and_limits_count_from_the_users_zero() -> None:
+    async def act(record: MotorRecord, _commander: Commander) -> None:
+        await record.show(replace(STATE, position=10.0, in_motion=True))
+        await record.show(replace(STATE, position=10.0, zero=4.0))
+        assert values(record, "VAL", "DVAL", "RBV", "DRBV") == [6.0, 10.0, 6.0, 10.0]
+        assert values(record, "LLM", "HLM", "DLLM", "DHLM") == [-104.0, 96.0, -100.0, 100.0]
+        for name, low, high in (("VAL", -104.0, 96.0), ("RBV", -104.0, 96.0), ("DVAL", -100, 100)):
+            shown = record.channels[f"R.{name}"]
+            assert (shown.lower_ctrl_limit, shown.upper_ctrl_limit) == (low, high)
+
+    with_record(act)
+
+
+def test_an_alarm_ends_with_its_cause() -> None:
+    async def act(record: MotorRecord, commander: Commander) -> None:
+        commander.arrive.set()
+        commander.refused = refusal(refuse(Reason.STOPPED, "motion is stopped"))
+        assert not await put(record, HOLDER, 60.0)
+        await record.forget("NO_LEASE")
+        assert record.channels["R.RBV"].alarm.status == ca.ALARMS["STOPPED"][0]
+        await record.forget("STOPPED")
+        assert record.channels["R.RBV"].alarm.severity == 0
+        assert values(record, "STAT", "SEVR") == [0, 0]
+        assert record.channels["R:reason"].value == ""
+
+    with_record(act)
+
+
+def test_who_may_not_move_does_not_change_how_far_a_tweak_goes() -> None:
+    async def act(record: MotorRecord, _commander: Commander) -> None:
+        assert not await put(record, STRANGER, 50.0, "TWV")
+        assert values(record, "TWV") == [1.0]
+        assert await put(record, HOLDER, 3.0, "TWV")
+        assert values(record, "TWV") == [3.0]
+        assert await put(record, HOLDER, 1e6, "TWV"), "the gate refuses what goes too far"
 
     with_record(act)

@@ -1,11 +1,15 @@
 """What the section [network] means."""
 
+import shutil
 from pathlib import Path
 
 import pytest
 
+import cosmic
+from cosmic.app.configuration.gateways import HttpClient
 from cosmic.app.configuration.network import NetworkSettings, serving
 from cosmic.app.stations.address import StationAddress
+from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.certificates import make_certificates
@@ -59,3 +63,20 @@ def test_an_address_names_the_station_and_where_it_listens() -> None:
     for text in ("", "fibervision=", "=tcp/127.0.0.1:7448"):
         with pytest.raises(ConfigError, match=r"it reads NAME=|was used before.*Give its address"):
             StationAddress.read(text)
+
+
+def test_a_token_is_in_no_record_and_in_no_recording(tmp_path: Path) -> None:
+    client = HttpClient(name="desk", token="correct horse battery", access="move")
+    assert "horse" not in f"{client}{client.model_dump()}"
+    shutil.copytree(shipped_config_dir(), tmp_path / "config")
+    platform = tmp_path / "config" / "platform.toml"
+    with platform.open("a") as file:
+        file.write('\n[[network.http.client]]\nname = "desk"\ntoken = "correct horse battery"\n')
+    with (
+        cosmic.connect(config=platform, applications=("daqco",)) as rig,
+        rig.daqco.record(tmp_path / "push.h5"),
+    ):
+        pass
+    assert b"horse" not in (tmp_path / "push.h5").read_bytes()
+    with cosmic.open_recording(tmp_path / "push.h5") as recording:
+        assert 'token = ""' in recording.configuration

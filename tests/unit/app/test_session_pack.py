@@ -12,6 +12,7 @@ import pytest
 from cosmic.app.cli import main
 from cosmic.app.session_pack import METADATA, pack_session
 from cosmic.frame.errors import RecordingError, RecordingExistsError
+from cosmic.frame.network.certificates import make_certificates
 
 
 @pytest.fixture
@@ -41,6 +42,36 @@ def test_everything_is_in_it_and_described(session: Path) -> None:
     assert known["campaign/fibres/0001.h5"]["encodingFormat"] == "application/x-hdf5"
     assert known[METADATA]["conformsTo"]["@id"].startswith("https://w3id.org/ro/crate/1.1")
     assert known["./"]["name"] == "monday"
+
+
+def test_names_are_addresses_as_ro_crate_wants_them(session: Path) -> None:
+    (session / "push #1 50 %.csv").write_text("a,b")
+    pack_session([session / "push #1 50 %.csv"], session / "x.zip")
+    with zipfile.ZipFile(session / "x.zip") as file:
+        assert "push #1 50 %.csv" in file.namelist()
+        known = {each["@id"]: each for each in json.loads(file.read(METADATA))["@graph"]}
+    assert known["./"]["hasPart"] == [{"@id": "push%20%231%2050%20%25.csv"}]
+    assert known["push%20%231%2050%20%25.csv"]["name"] == "push #1 50 %.csv"
+
+
+def test_what_is_given_away_has_neither_tokens_nor_private_keys(
+    session: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = session / "config"
+    make_certificates(config / "keys", "fibres")
+    text = '[[network.http.client]]\nname = "desk"\ntoken = "correct horse battery"  # of May\n'
+    (config / "platform.toml").write_text(text)
+    target = session / "x.zip"
+    assert main(["session", "pack", str(config), "--output", str(target)]) == 0
+    assert "private key" in capsys.readouterr().err
+    with zipfile.ZipFile(target) as file:
+        packed = {name: file.read(name) for name in file.namelist()}
+    assert not [name for name, content in packed.items() if b"PRIVATE KEY" in content]
+    assert [name for name in packed if name.endswith((".pem", ".crt"))]
+    kept = packed["config/platform.toml"]
+    assert kept == text.replace("correct horse battery", "").encode()
+    known = {each["@id"]: each for each in json.loads(packed[METADATA])["@graph"]}
+    assert known["config/platform.toml"]["sha256"] == hashlib.sha256(kept).hexdigest()
 
 
 def test_what_cannot_be_packed_is_said_and_nothing_is_left(session: Path) -> None:

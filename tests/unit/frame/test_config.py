@@ -1,11 +1,18 @@
 """Strict configuration whose every error names file, key and reason."""
 
+import tomllib
 from pathlib import Path
 
 import pytest
 from pydantic import Field, ValidationError, field_validator
 
-from cosmic.frame.config import StrictModel, load_model, read_toml, shipped_config_dir
+from cosmic.frame.config import (
+    StrictModel,
+    load_model,
+    read_toml,
+    shipped_config_dir,
+    without_tokens,
+)
 from cosmic.frame.errors import ConfigError
 
 
@@ -99,3 +106,19 @@ def test_the_shipped_configuration_is_there_and_is_toml() -> None:
     files = sorted(shipped_config_dir().glob("*.toml"))
     assert files
     assert all(read_toml(each) for each in files)
+
+
+@pytest.mark.parametrize(
+    "token",
+    ['"s3cret word"', "'s3cret word'", '"""\ns3cret\nword"""', '"s3cret \\" word"', "'''s3cret'''"],
+)
+def test_a_token_is_not_kept_and_all_else_is(token: str) -> None:
+    for text in (
+        f'# of the lab\n[[client]]\nname = "desk"\ntoken={token}  # new in May\naccess = "move"\n',
+        f'client = [{{name = "desk", token = {token}, access = "move"}}]\n',
+        f'[[client]]\n"token"  = {token}\nname = "desk"\naccess = "move"\n',
+    ):
+        kept = without_tokens(text)
+        assert "s3cret" not in kept
+        assert kept == text.replace(token, '""')
+        assert tomllib.loads(kept)["client"] == [{"name": "desk", "token": "", "access": "move"}]

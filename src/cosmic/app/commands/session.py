@@ -22,6 +22,8 @@ def run(chosen: argparse.Namespace) -> int:
             f"cosmic: {path}: is cut off, or was not closed by its writer; it is packed as it is. "
             f"Run cosmic repair {path} and pack again\n"
         )
+    for path in packed.left_out:
+        sys.stderr.write(f"cosmic: {path}: has a private key, and is left out\n")
     size_mb = packed.size_bytes / 1e6
     sys.stdout.write(f"{packed.path}: {packed.files} files, {size_mb:.1f} MB\n")
     return 0

@@ -21,7 +21,8 @@ class HttpClient(StrictModel):
     """A program that may use HTTP, and how far."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")
-    token: str = Field(min_length=SHORTEST_TOKEN)
+    # In no record of a campaign, and in no message.
+    token: str = Field(min_length=SHORTEST_TOKEN, exclude=True, repr=False)
     access: Word = "view"
 
 

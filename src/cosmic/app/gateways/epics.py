@@ -3,16 +3,19 @@
 import asyncio
 import json
 import logging
+import types
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import partial
 from itertools import count
-from math import inf, isfinite
 from threading import Lock
-from typing import Any, Final, get_args
+from typing import Any, Final, Union, get_args, get_origin, get_type_hints
 
 from cosmic.app.configuration.gateways import EpicsSettings
 from cosmic.app.gateways import epics_channels as ca
-from cosmic.app.gateways.catalogue import Command, commands_of
+from cosmic.app.gateways.catalogue import Command, commands_of, places_of
 from cosmic.app.gateways.epics_channels import Channel, ChannelServer, Who
 from cosmic.app.gateways.epics_image import ImageRecord
 from cosmic.app.gateways.epics_motor import MotorRecord, ValueRecord
@@ -21,7 +24,7 @@ from cosmic.app.gateways.session import Approve, GatewaySession
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.frame.clock import WALL
 from cosmic.frame.declaration import Declared, declaration_of
-from cosmic.frame.errors import CosmicError
+from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.errors import Busy, CallRefused
@@ -41,19 +44,24 @@ logger = logging.getLogger(__name__)
 SHOWN_EVERY_S: Final = 0.04
 IMAGES_EVERY_S: Final = 0.5
 MOST_WAITING: Final = 32
+LONGEST_SILENCE_S: Final = 600
 _PLAIN: Final = (bool, int, float, str)
+_Make = Callable[[], Channel]
 
 
 class EpicsGateway:
     """A station as records; `close` it in every case.
 
     Each line of a client is a session of its own. It takes the right to move by a put of 1 to
-    PREFIX + "control", and loses it with its line.
+    PREFIX + "control", and loses it with its line; by a put of seconds, also when it says nothing
+    for so long.
 
     Raises
     ------
     NotAvailable
         It cannot listen there.
+    ConfigError
+        Two things would have the same name.
     """
 
     def __init__(
@@ -86,13 +94,21 @@ class EpicsGateway:
         self._going: dict[tuple[str, tuple[str, ...]], list[Operation[Any]]] = {}
         self._control = ca.whole(put=self._take)
         self._holder = ca.line()
-        channels = dict(self._all_channels())
+        self._why_not = ca.text(length=500)
+        self._of: dict[str, dict[str, _Make]] = {}
+        self._there: dict[str, object] = {}
+        channels: dict[str, Channel] = {}
+        for name, channel in self._all_channels():
+            if name in channels:
+                raise ConfigError(f"EPICS: two things would be the record {name}; rename one")
+            channels[name] = channel
         self._server = ChannelServer(
             channels,
             (settings.interface, settings.port),
             station.policy,
             self._show,
             self._gone,
+            self._heard,
         )
         self._follow()
         self._server.start()
@@ -131,16 +147,48 @@ class EpicsGateway:
     def _all_channels(self) -> Iterator[tuple[str, Channel]]:
         yield f"{self._prefix}control", self._control
         yield f"{self._prefix}control:holder", self._holder
+        yield f"{self._prefix}control:reason", self._why_not
         for name, host in self._hosts.items():
             values = host.state(whole=False).values
-            for command in commands_of(name, type(host.served)):
-                for keys in _keys(values, command.place.parts, command.place.keyed):
-                    yield self._command_channel(command, keys)
-            for at, kind in _plain_states(host.served, (name,)):
-                channel = _state_channel(kind)
-                self._states[at] = channel
-                yield self._prefix + _joined(at), channel
+            self._there[name] = _parts_there(name, host, values)
+            declared = list(self._declared(name, host, values))
+            self._of[name] = dict(declared)
+            for record, make in declared:
+                yield record, make()
             yield from self._special(name, values)
+
+    def _declared(
+        self, name: str, host: Host, values: Mapping[str, Any]
+    ) -> "Iterator[tuple[str, _Make]]":
+        """Yield the records of what an application declares, and how they are made."""
+        for command in commands_of(name, type(host.served)):
+            for keys in _keys(values, command.place.parts, command.place.keyed):
+                parts, keyed = command.place.parts, command.place.keyed
+                at = (name, *_steps(parts, keyed, keys), command.declared.name)
+                yield self._prefix + _joined(at), partial(self._command_channel, command, keys)
+        for at, kind in _plain_states(host.served, (name,)):
+            yield self._prefix + _joined(at), partial(self._state_record, at, kind)
+
+    def _state_record(self, at: tuple[str, ...], kind: Any) -> Channel:
+        self._states[at] = _state_channel(kind)
+        return self._states[at]
+
+    def _follow_parts(self, name: str, values: Mapping[str, Any]) -> None:
+        """Add the records of parts that have come, such as players, and end those that are gone."""
+        host = self._hosts[name]
+        there = _parts_there(name, host, values)
+        if there == self._there[name]:
+            return
+        before, now = self._of[name], dict(self._declared(name, host, values))
+        gone = {each for each in before if each not in now}
+        self._states = {
+            at: each
+            for at, each in self._states.items()
+            if at[0] != name or self._prefix + _joined(at) not in gone
+        }
+        come = {each: make() for each, make in now.items() if each not in before}
+        self._server.change(come, gone)
+        self._there[name], self._of[name] = there, now
 
     def _special(self, name: str, values: Mapping[str, Any]) -> Iterator[tuple[str, Channel]]:
         for axis, held in values.get("axes", {}).items() if name == "mico" else ():
@@ -160,7 +208,7 @@ class EpicsGateway:
             self._images[camera] = ImageRecord(base, camera, kind)
             yield from self._images[camera].channels.items()
 
-    def _command_channel(self, command: Command, keys: tuple[str, ...]) -> tuple[str, Channel]:
+    def _command_channel(self, command: Command, keys: tuple[str, ...]) -> Channel:
         async def put(who: Who, said: str) -> None:
             channel = made
             try:
@@ -177,8 +225,7 @@ class EpicsGateway:
             await _answer(channel, {"result": to_json(result)})
 
         made = ca.text("{}", put=put)
-        steps = [command.place.application, *_steps(command.place.parts, command.place.keyed, keys)]
-        return self._prefix + _joined((*steps, command.declared.name)), made
+        return made
 
     # Commands
 
@@ -224,7 +271,7 @@ class EpicsGateway:
         job = queue.submit(lambda: session.carry_out(order), order.title)
         await _ended(job)
         result = job.result
-        if order.found.mark.at_once:
+        if order.found.mark.at_once and not order.found.mark.renews:
             self._take_back(application, keys)
         if isinstance(result, Operation):
             going = self._going.setdefault((application, keys), [])
@@ -245,11 +292,30 @@ class EpicsGateway:
 
     async def _take(self, who: Who, value: int) -> None:
         session = self._session(who)
-        if value:
-            session.take_control(in_process=True)  # its line is watched instead
-        else:
-            session.release_control()
+        try:
+            self._change_control(session, value)
+        except CosmicError as exc:
+            await ca.show(self._why_not, str(exc)[:499])
+            raise
+        await ca.show(self._why_not, "")
+        if session.in_control:
+            for motor in self._motors.values():
+                await motor.forget("NO_LEASE")
         await self._show_one(LEASE_TOPIC, self._station.lease.state)
+
+    @staticmethod
+    def _change_control(session: GatewaySession, value: int) -> None:
+        if value == 0:
+            session.release_control()
+        elif value == 1:
+            session.take_control(in_process=True)  # its line is watched instead
+        elif 2 <= value <= LONGEST_SILENCE_S:
+            session.take_control(keep_s=float(value))
+        else:
+            raise CallRefused(
+                "put 1 to take the right to move, 0 to give it back, 2 to "
+                f"{LONGEST_SILENCE_S} to have it for so many seconds of silence"
+            )
 
     def _session(self, who: Who) -> GatewaySession:
         with self._lock:
@@ -261,6 +327,20 @@ class EpicsGateway:
                 )
                 self._sessions[who.address] = found
         return found
+
+    def _heard(self, address: tuple[str, int]) -> None:
+        found = self._sessions.get(address)
+        if found is not None:
+            found.beat()
+
+    def _end_silent(self) -> None:
+        """End what moves for clients that want to be watched and have fallen silent."""
+        with self._lock:
+            watched = [each for each in self._sessions.values() if each.may_be_silent]
+        for each in watched:
+            each.end_silent_motion()
+        if watched:
+            self._station.lease.poll()
 
     def _gone(self, address: tuple[str, int]) -> None:
         with self._lock:
@@ -290,7 +370,10 @@ class EpicsGateway:
         images_due_s = 0.0
         while True:
             await asyncio.sleep(SHOWN_EVERY_S)
+            self._end_silent()
             now_s = WALL.now_s()
+            for value in self._values.values():
+                await value.look(now_s)
             images = now_s >= images_due_s
             if images:
                 images_due_s = now_s + IMAGES_EVERY_S
@@ -315,19 +398,22 @@ class EpicsGateway:
             await self._images[payload.camera].show(payload)
 
     async def _show_state(self, application: str, values: Mapping[str, Any]) -> None:
+        self._follow_parts(application, values)
         if application == "mico":
             for axis, motor in self._motors.items():
                 held = values["axes"].get(axis)
                 if held is not None:
                     await motor.show(held["_latest"])
-        for at, channel in self._states.items():
+                if values["stop_state"].reason is None:
+                    await motor.forget("STOPPED")
+        for at, channel in list(self._states.items()):
             if at[0] != application:
                 continue
             value: Any = values
             for step in at[1:]:
-                value = value.get(step) if isinstance(value, Mapping) else None
-            if value is not None:
-                await _show_plain(channel, value)
+                inside = isinstance(value, Mapping)
+                value = value.get(step) if inside else getattr(value, step, None)
+            await _show_plain(channel, value)
 
     async def _show_samples(self, chunk: DataChunk) -> None:
         served: Any = self._hosts["daqco"].served
@@ -335,9 +421,9 @@ class EpicsGateway:
         for row, name in enumerate(chunk.channels):
             record = self._values.get(name)
             if record is not None:
-                limit, scale = limits.get(name), chunk.scales[row]
-                low, high = (limit.low, limit.high) if limit is not None else (-inf, inf)
-                await record.show(scale.apply(chunk.volts[row]), scale.unit, low, high)
+                scale = chunk.scales[row]
+                samples = scale.apply(chunk.volts[row])
+                await record.show(samples, scale.unit, limits.get(name), WALL.now_s())
 
 
 async def _ended(operation: Operation[Any]) -> None:
@@ -355,6 +441,12 @@ async def _ended(operation: Operation[Any]) -> None:
 async def _answer(channel: Channel, said: dict[str, Any]) -> None:
     coded = json.dumps(said)
     await channel.write(coded if len(coded) < ca.JSON_LENGTH else '{"result": "too large"}')
+
+
+def _parts_there(name: str, host: Host, values: Mapping[str, Any]) -> object:
+    """Return which objects of an application there are."""
+    places = places_of(name, type(host.served))
+    return {(each.parts, tuple(_keys(values, each.parts, each.keyed))) for each in places}
 
 
 def _plain(name: str) -> str:
@@ -392,18 +484,42 @@ def _keys(
 
 
 def _plain_states(served: Declared, at: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Yield where each state is that is a number, a truth value or a text, and of which kind."""
+    """Yield where each state is that is a number, a truth value or a text, and of which kind.
+
+    The fields of a state that is made of them are there as well, such as "stop_state", "reason".
+    """
     declaration = declaration_of(type(served))
     for name, each in declaration.state.items():
-        kinds = [kind for kind in (get_args(each.kind) or (each.kind,)) if kind in _PLAIN]
-        if kinds and not each.fixed:
-            yield (*at, name), kinds[0]
+        if each.fixed:
+            continue
+        (kind,) = _kinds(each.kind)[:1] or (None,)
+        if is_dataclass(kind) and isinstance(kind, type):
+            hints = get_type_hints(kind)
+            for field in fields(kind):
+                yield from _if_plain((*at, name, field.name), hints[field.name])
+        else:
+            yield from _if_plain((*at, name), each.kind)
     for name, part in declaration.parts.items():
         found = getattr(served, name)
         inner = found.items() if part.keyed else [("", found)]
         for key, held in inner:
             if held is not None:
                 yield from _plain_states(held, (*at, name, key) if key else (*at, name))
+
+
+def _if_plain(at: tuple[str, ...], annotation: Any) -> Iterator[tuple[tuple[str, ...], Any]]:
+    kinds = _kinds(annotation)
+    if len(kinds) == 1 and kinds[0] in _PLAIN:
+        yield at, kinds[0]
+    elif len(kinds) == 1 and isinstance(kinds[0], type) and issubclass(kinds[0], Enum):
+        yield at, str
+
+
+def _kinds(annotation: Any) -> tuple[Any, ...]:
+    """Return what an annotation lets in, but for None."""
+    alternatives = get_origin(annotation) in (Union, types.UnionType)
+    found = get_args(annotation) if alternatives else (annotation,)
+    return tuple(each for each in found if each is not type(None))
 
 
 def _state_channel(kind: Any) -> Channel:
@@ -413,9 +529,15 @@ def _state_channel(kind: Any) -> Channel:
 
 
 async def _show_plain(channel: Channel, value: object) -> None:
-    if isinstance(value, str):
-        await ca.show(channel, value[:499])
-    elif isinstance(value, float):
-        await ca.show(channel, value, ca.NO_ALARM if isfinite(value) else ca.UNKNOWN)
-    elif isinstance(value, int):
-        await ca.show(channel, max(-(2**31), min(2**31 - 1, int(value))))
+    """Show a value; one that nobody knows has an alarm, where it is a number."""
+    shown = to_json(value)
+    if isinstance(channel, ca.Text):
+        await ca.show(channel, "" if shown is None else str(shown)[:499])
+    elif shown is None:
+        await ca.show(channel, channel.value, ca.UNKNOWN)
+    elif isinstance(shown, float):
+        await ca.show(channel, shown)
+    elif isinstance(shown, int):
+        fits = -(2**31) <= shown < 2**31  # Channel Access has no longer ones
+        newest = shown if fits else channel.value
+        await ca.show(channel, int(newest), ca.NO_ALARM if fits else ca.UNKNOWN)

@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
@@ -58,6 +58,7 @@ ALARMS: Final = {
 Alarm = tuple[AlarmStatus, AlarmSeverity]
 Channel = Any
 """A channel of caproto, which has no types."""
+Text = caproto.ChannelChar
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,6 +238,7 @@ class _Line(VirtualCircuit):  # type: ignore[misc]  # caproto has no types
 
     @override
     async def _process_command(self, command: Any) -> Any:
+        self.context.heard(tuple(self.circuit.address))
         if isinstance(command, caproto.EventAddRequest):
             held = self.subscriptions.items()
             values = sum(len(each) * of.db_entry.max_length for of, each in held)
@@ -261,6 +263,8 @@ class ChannelServer(WorkerThread):
         `run()` is awaited in the loop beside the server; it shows what changes.
     on_gone : callable
         `on_gone(address)` is called when the line of a client has ended.
+    on_heard : callable
+        `on_heard(address)` is called for each message of a client, before it is carried out.
     """
 
     def __init__(
@@ -270,6 +274,7 @@ class ChannelServer(WorkerThread):
         policy: FailurePolicy,
         run: Callable[[], Awaitable[None]],
         on_gone: Callable[[tuple[str, int]], None],
+        on_heard: Callable[[tuple[str, int]], None],
     ) -> None:
         super().__init__("EPICS server", policy)
         logging.getLogger("caproto").setLevel(logging.ERROR)  # it logs each client that comes
@@ -277,6 +282,7 @@ class ChannelServer(WorkerThread):
         self._interface, self._port = where
         self._run = run
         self._on_gone = on_gone
+        self._on_heard = on_heard
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ending: asyncio.Event | None = None
         self._problem = ""
@@ -291,6 +297,13 @@ class ChannelServer(WorkerThread):
     def problem(self) -> str:
         """Why it does not listen; empty while it does."""
         return self._problem
+
+    def change(self, come: Mapping[str, Channel], gone: Iterable[str]) -> None:
+        """Serve more channels, and others no longer to whom asks for them; in the loop."""
+        for name in gone:
+            self._channels.pop(name, None)
+        for name, channel in come.items():
+            self._channels.setdefault(name, channel)
 
     @override
     def run_body(self) -> None:
@@ -319,6 +332,7 @@ class ChannelServer(WorkerThread):
             await accept(client, address)
 
         context.circuit_disconnected, context.tcp_handler = gone, come
+        context.heard = self._on_heard
         context.broadcast_beacon_loop = _nothing  # it would tell the whole network
         serving = asyncio.ensure_future(context.run())
         showing = asyncio.ensure_future(self._run())

@@ -11,6 +11,7 @@ from functools import partial
 from hashlib import sha256
 from importlib.resources import files
 from itertools import count
+from math import inf
 from typing import Any, Final, TypeVar
 
 from starlette.applications import Starlette
@@ -48,7 +49,7 @@ from cosmic.app.gateways.websocket_line import Handover, WebSocketLine
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.clock import WALL
 from cosmic.frame.declaration import Declared, declaration_of
-from cosmic.frame.errors import CosmicError
+from cosmic.frame.errors import CosmicError, OperationCancelled
 from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.network.caller import MOVE_LIMIT_S, Access
 from cosmic.frame.network.errors import Busy
@@ -64,6 +65,8 @@ T = TypeVar("T")
 
 MOST_REQUESTS_S: Final = 200.0
 """So many requests a second of one client are answered; what is more gets 429."""
+MOST_STOPS_S: Final = 20.0
+"""So many stops a second of one client are carried out beyond that."""
 MOST_WAITING: Final = 32
 """So many commands wait for one application."""
 LONGEST_WAIT_S: Final = 60.0
@@ -72,6 +75,23 @@ MCP_WAIT_S: Final = 45.0
 FIRST_WORD_S: Final = 3.0
 MOST_OPERATIONS: Final = 256
 SLOWED_AFTER: Final = 20
+
+
+class _Share:
+    """How many of something a client has had of late."""
+
+    def __init__(self) -> None:
+        self._left = inf
+        self._looked_s = 0.0
+
+    def take(self, now_s: float, most_s: float) -> bool:
+        """Take one; False where there were more than `most_s` a second."""
+        gained = (now_s - self._looked_s) * most_s
+        self._left, self._looked_s = min(most_s, self._left + gained), now_s
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
 
 
 @dataclass
@@ -83,8 +103,8 @@ class _User:
     operations: dict[str, Operation[Any]] = field(default_factory=dict)
     numbers: "count[int]" = field(default_factory=lambda: count(1))
     lines: int = 0
-    tokens: float = MOST_REQUESTS_S
-    looked_s: float = 0.0
+    requests: _Share = field(default_factory=_Share)
+    stops: _Share = field(default_factory=_Share)
     heard_s: float = 0.0
 
     def keep(self, operation: Operation[Any]) -> str:
@@ -102,15 +122,6 @@ class _User:
         if found is None:
             raise HttpError(404, f"there is no operation {number[:20]!r}")
         return found
-
-    def admit(self, now_s: float) -> bool:
-        """Take note of a request; False where there were too many."""
-        self.tokens = min(MOST_REQUESTS_S, self.tokens + (now_s - self.looked_s) * MOST_REQUESTS_S)
-        self.looked_s = now_s
-        if self.tokens < 1.0:
-            return False
-        self.tokens -= 1.0
-        return True
 
 
 class HttpGateway:
@@ -151,6 +162,12 @@ class HttpGateway:
             (name, each.function): each.declared.need.timeout_s
             for name, kind in kinds.items()
             for each in commands_of(name, kind)
+        }
+        self._stops = {
+            (name, each.function)
+            for name, kind in kinds.items()
+            for each in commands_of(name, kind)
+            if each.declared.need.at_once
         }
         self._approve = approve
         self._users = {
@@ -253,9 +270,20 @@ class HttpGateway:
         now_s = WALL.now_s()
         user.heard_s = now_s
         user.session.beat()
-        if not user.admit(now_s):
+        admitted = user.requests.take(now_s, MOST_REQUESTS_S) or (
+            self._is_stop(request) and user.stops.take(now_s, MOST_STOPS_S)
+        )
+        if not admitted:
             raise HttpError(429, f"more than {MOST_REQUESTS_S:g} requests a second")
         return user
+
+    def _is_stop(self, request: Request) -> bool:
+        """Return whether a request is a command that waits for nothing."""
+        named = request.path_params
+        with suppress(HttpError):
+            function, _ = self._address(named.get("application", ""), named.get("path", ""))
+            return request.method == "POST" and (named["application"], function) in self._stops
+        return False
 
     def _user_of(self, token: str) -> _User | None:
         found = self._users.get(sha256(token.encode("utf-8", "replace")).digest())
@@ -342,7 +370,7 @@ class HttpGateway:
             left_s = min(BEAT_S, until_s - WALL.now_s())
             await ended(operation, max(left_s, 0.001))
             if await request.is_disconnected():
-                operation.cancel()
+                _give_up(operation)
                 raise HttpError(400, "hung up")
             user.session.beat()
 
@@ -351,6 +379,7 @@ class HttpGateway:
     async def _command(self, request: Request, user: _User) -> Response:
         application = request.path_params["application"]
         function, keys = self._address(application, request.path_params["path"])
+        seconds_of(request, "wait", 0.0, LONGEST_WAIT_S)  # refused before anything is carried out
         arguments = await body_of(request)
         order = user.session.order(application, function, arguments, keys)
         queue = "stops" if order.found.mark.at_once else application
@@ -419,12 +448,17 @@ class HttpGateway:
     async def _carried_out(self, request: Request, user: _User, order: Order, queue: str) -> object:
         if queue != "stops" and self._queues[queue].waiting >= MOST_WAITING:
             raise Busy(f"too many commands wait for {queue}")
-        job = self._queues[queue].submit(lambda: user.session.carry_out(order), order.title)
-        wait_s = self._waiting_s.get((order.application, order.found.name), LONGEST_WAIT_S)
-        await self._watched(request, user, job, max(wait_s, 2.0))
-        if not job.done:
-            raise Busy(f"{order.title} takes longer than {wait_s:g} s")
-        return job.result
+        job: Operation[object] = Operation(order.title)
+        wanted = partial(_check_wanted, job)
+        self._queues[queue].put(lambda: user.session.carry_out(order, wanted), job)
+        wait_s = max(self._waiting_s.get((order.application, order.found.name), 0.0), 2.0)
+        await self._watched(request, user, job, wait_s)
+        if job.done:
+            return job.result
+        _give_up(job)
+        if job.done:
+            raise Busy(f"{order.title} had not begun after {wait_s:g} s and was not carried out")
+        raise Busy(f"{order.title} takes longer than {wait_s:g} s; what it begins is ended")
 
     def _address(self, application: str, path: str) -> tuple[str, tuple[str, ...]]:
         """Return the function and the keys that a path names."""
@@ -530,14 +564,16 @@ class HttpGateway:
                 return
             if not self._lines.know(socket_.client, found):
                 raise HttpError(429, f"a client has at most {MOST_LINES} connections")
-            found.lines += 1
-            user = found
-            await line.send(json.dumps({"topic": "hello", "payload": user.settings.name}))
-            sending = asyncio.create_task(line.run(user.session.beat))
+            beat = found.session.beat
+            if first.get("looks_only") is True:  # it is there for no program that moves
+                beat = _nothing
+            else:
+                found.lines += 1
+                user = found
+            await line.send(json.dumps({"topic": "hello", "payload": found.settings.name}))
+            sending = asyncio.create_task(line.run(beat))
             try:
-                await self._follow(first, line, ends)
-                while True:
-                    await self._follow(await word_of(socket_), line, ends)
+                await self._follow_words(socket_, first, line, ends)
             finally:
                 line.end()
                 sending.cancel()
@@ -559,6 +595,18 @@ class HttpGateway:
         if user.lines == 0:
             user.session.hang_up()
 
+    async def _follow_words(
+        self,
+        socket_: WebSocket,
+        first: Mapping[str, Any],
+        line: WebSocketLine,
+        ends: list[Unfollow],
+    ) -> None:
+        word = first
+        while True:
+            await self._follow(word, line, ends)
+            word = await word_of(socket_)
+
     async def _follow(
         self, word: Mapping[str, Any], line: WebSocketLine, ends: list[Unfollow]
     ) -> None:
@@ -579,6 +627,26 @@ _POLICY: Final = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "connect-src 'self' ws: wss:; frame-ancestors 'none'"
 )
+
+
+def _check_wanted(job: Operation[object]) -> None:
+    if job.cancel_requested:
+        raise OperationCancelled(f"{job.title}: nobody waits for it any more")
+
+
+def _give_up(job: Operation[Any]) -> None:
+    """Have it not begin, or end it and what it begins."""
+
+    def end(ended: Operation[Any]) -> None:
+        if ended.failure is None and isinstance(ended.result, Operation):
+            ended.result.cancel()
+
+    job.cancel()
+    job.add_callback(end)
+
+
+def _nothing() -> None:
+    """Take no note."""
 
 
 def _end_all(ends: list[Unfollow]) -> None:

@@ -87,7 +87,7 @@ class McpTools:
         """Carry out a tool that is no command of an application."""
         try:
             result = await _FIXED[name](given, uses)
-        except (HttpError, TypeError, ValueError) as exc:
+        except HttpError as exc:
             return _error(number, _BAD_PARAMS, str(exc)[:1000])
         except CosmicError as exc:
             return _result(number, _failed(exc))
@@ -112,15 +112,20 @@ class McpTools:
         return _result(number, _said(json.dumps(to_json(result)), failed=False))
 
 
+def _seconds(given: Mapping[str, Any], name: str, default_s: float, *, least_s: float) -> float:
+    found = given.get(name, default_s)
+    plain = isinstance(found, (int, float)) and not isinstance(found, bool)
+    if not plain or not least_s <= found < inf:
+        raise HttpError(400, f"{name}: a number of seconds from {least_s:g} on")
+    return float(min(found, 1e9))
+
+
 async def _look(given: Mapping[str, Any], uses: McpUses) -> object:
     return await uses.look(str(given.get("application", "")), str(given.get("path", "")))
 
 
 async def _take(given: Mapping[str, Any], uses: McpUses) -> object:
-    keep_s = float(given.get("keep_s", USUAL_KEEP_S))
-    if not 1.0 <= keep_s < inf:
-        raise ValueError("keep_s: a number of seconds from 1 on")
-    return await uses.control(keep_s)
+    return await uses.control(_seconds(given, "keep_s", USUAL_KEEP_S, least_s=1.0))
 
 
 async def _release(_given: Mapping[str, Any], uses: McpUses) -> object:
@@ -128,9 +133,7 @@ async def _release(_given: Mapping[str, Any], uses: McpUses) -> object:
 
 
 async def _follow(given: Mapping[str, Any], uses: McpUses) -> object:
-    wait_s = float(given.get("wait_s", 20.0))
-    if not 0.0 <= wait_s < inf:
-        raise ValueError("wait_s: a number of seconds")
+    wait_s = _seconds(given, "wait_s", 20.0, least_s=0.0)
     return await uses.follow(str(given.get("operation", "")), wait_s, given.get("end") is True)
 
 

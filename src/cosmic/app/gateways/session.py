@@ -117,7 +117,7 @@ class GatewaySession:
             raise CallRefused(f"{self.name} may not move anything")
         token = self._caller.token
         self._station.lease.take(self.name, token, in_process=in_process, keep_s=keep_s)
-        self._keep_s = keep_s
+        self._keep_s = MOVE_LIMIT_S if in_process else keep_s
         self.beat()
 
     def release_control(self) -> None:
@@ -203,8 +203,13 @@ class GatewaySession:
             given[NUMBER] = next(self._numbers)
         return Order(application, found, found.checked(given), caller)
 
-    def carry_out(self, order: Order) -> object:
+    def carry_out(self, order: Order, still_wanted: Callable[[], None] | None = None) -> object:
         """Carry a command out and return its result; an `Operation` where it goes on.
+
+        Parameters
+        ----------
+        still_wanted : callable or None
+            Called when its turn has come; raises when nobody waits for it any more.
 
         Raises
         ------
@@ -218,11 +223,11 @@ class GatewaySession:
                 with self._lock:
                     self._asked = [*(each for each in self._asked if not each.done), asked]
             return asked
-        return self._invoke(order)
+        return self._invoke(order, still_wanted)
 
-    def _invoke(self, order: Order) -> object:
+    def _invoke(self, order: Order, still_wanted: Callable[[], None] | None = None) -> object:
         invoker = self._station.invoker(order.application)
-        result = invoker.invoke(order.caller, order.found.name, order.arguments)
+        result = invoker.invoke(order.caller, order.found.name, order.arguments, still_wanted)
         wrapped = self._tickets.wrap(result, moves=order.found.mark.moves)
         answer = wrapped.result if isinstance(wrapped, Answered) else wrapped
         if isinstance(answer, Ticket):

@@ -19,6 +19,7 @@ from cosmic.daqco.hw.factory import UnavailableBoards, make_library
 from cosmic.daqco.hw.factory import join as join_boards
 from cosmic.daqco.hw.interface import BoardLibrary, Source
 from cosmic.frame.application import CosmicApplicationBase, GuiFactory
+from cosmic.frame.config import without_tokens
 from cosmic.frame.errors import ConfigError, NotAvailable, PluginError
 from cosmic.frame.plugins import Kind, NoOptions, make
 from cosmic.frame.version import __version__
@@ -192,7 +193,7 @@ def _build_daqco(_options: NoOptions, context: ApplicationContext) -> CosmicAppl
         clock=site.clock,
         policy=site.policy,
         software=f"CoSMic {__version__}",
-        configuration=site.path.read_text(encoding="utf-8"),
+        configuration=without_tokens(site.path.read_text(encoding="utf-8")),
         notes=notes,
         gui_factory=context.gui_factory,
     )

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from cosmic.autonomy.campaign.records import CampaignError
 from cosmic.autonomy.campaign.store import write_through, write_whole
+from cosmic.frame.config import without_tokens
 
 RECORD: Final = "record"
 """Folder with a file for each run, and copies of the files it was made with."""
@@ -56,7 +57,7 @@ def write_provenance(folder: Path, run: int, provenance: Provenance, recipe_text
     record = folder / RECORD
     try:
         (record / FILES).mkdir(parents=True, exist_ok=True)
-        contents = {name: path.read_bytes() for name, path in provenance.files.items()}
+        contents = {name: _content(path) for name, path in provenance.files.items()}
     except OSError as exc:
         raise CampaignError(f"{record}: what the run is made with is not kept: {exc}") from exc
     contents["recipe.toml"] = recipe_text.encode()
@@ -71,6 +72,16 @@ def write_provenance(folder: Path, run: int, provenance: Provenance, recipe_text
     write_whole(file, json.dumps(page, indent=1, default=str, ensure_ascii=False).encode())
     write_through(record)
     return file
+
+
+def _content(path: Path) -> bytes:
+    """Return what is kept of a file: all but the tokens of clients."""
+    content = path.read_bytes()
+    if path.suffix != ".toml":
+        return content
+    return without_tokens(content.decode("utf-8", "surrogateescape")).encode(
+        "utf-8", "surrogateescape"
+    )
 
 
 def _kept(record: Path, name: str, content: bytes) -> dict[str, str]:

@@ -186,7 +186,7 @@ class Host:
         self, command: CommandDeclaration, parts: tuple[str, ...], keyed: tuple[bool, ...]
     ) -> Offered:
         need = command.need
-        mark = RemoteMark(need.moves, need.reads, need.overtakes, need.limit_s)
+        mark = RemoteMark(need.moves, need.reads, need.overtakes, need.limit_s, need.renews)
         parameters, required = dict(command.parameters), command.required
         if any(keyed):
             parameters[KEYS] = tuple[str, ...]

@@ -12,6 +12,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import Access, Call, Caller, carrying_out
 from cosmic.frame.network.errors import Busy, CallRefused, RemoteDefect
 from cosmic.frame.network.lease import StationLease
+from cosmic.frame.network.ongoing import Answered, Ongoing
 from cosmic.frame.network.remote import Offered, offered_by
 
 FOR_EVER: Final = -1.0
@@ -20,12 +21,19 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """A call that was carried out, or refused; what it began may go on."""
+    """A call that was carried out, or refused.
+
+    Attributes
+    ----------
+    goes_on : Ongoing or None
+        What it began, if that goes on.
+    """
 
     caller: Caller
     found: Offered
     arguments: Mapping[str, object]
     error: CosmicError | None
+    goes_on: Ongoing | None = None
 
 
 class ApplicationInvoker:
@@ -121,7 +129,9 @@ class ApplicationInvoker:
         except CosmicError as exc:
             self.ended.emit(Ended(caller, found, arguments, exc))
             raise
-        self.ended.emit(Ended(caller, found, arguments, None))
+        answer = result.result if isinstance(result, Answered) else result
+        goes_on = answer if isinstance(answer, Ongoing) else None
+        self.ended.emit(Ended(caller, found, arguments, None, goes_on))
         return result
 
     def _invoke(

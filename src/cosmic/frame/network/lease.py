@@ -3,7 +3,7 @@
 import logging
 import secrets
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Lock
 from typing import Final
 
@@ -64,6 +64,11 @@ class StationLease:
         How the local holder is called.
     offered : bool
         Whether others may take it from the start.
+
+    Attributes
+    ----------
+    refused : Event
+        `refused(name, verdict)` is emitted when a session was refused it.
     """
 
     def __init__(
@@ -78,6 +83,7 @@ class StationLease:
         self._offered = offered
         self._why = ""
         self._changed: Event[LeaseState] = Event()
+        self.refused: Event[str, MoveVerdict] = Event()
 
     @property
     def local_token(self) -> str:
@@ -116,25 +122,42 @@ class StationLease:
             Another holds it, or it is not offered (`NO_LEASE`).
         """
         self.poll()
+        limit_s = float("inf") if in_process else keep_s
         with self._lock:
-            held = self._grant
-            if held is None and not self._offered:
-                raise refusal(_refused(f"{self._local.name} keeps the right to move to itself"))
-            if held is not None and not secrets.compare_digest(held.token, token):
-                raise refusal(_refused(f"the right to move is held by {held.name}"))
-            limit_s = float("inf") if in_process else keep_s
-            changed = held is None or held.pulse.limit_s != limit_s
-            if held is None:
-                pulse = Pulse(name, limit_s=limit_s, clock=self._clock)
-                self._grant = _Grant(name, token, pulse, in_process)
-            else:
-                held.pulse.bear(limit_s)
-            if changed:
-                kept = MOVE_LIMIT_S < limit_s < float("inf")
-                silence = f", who may be silent for {limit_s:g} s" if kept else ""
-                self._why = f"taken by {name}{silence}"
+            verdict = self._verdict_on(token)
+            changed = verdict is None and self._give(name, token, limit_s, in_process=in_process)
+        if verdict is not None:
+            self.refused.emit(name, verdict)
+            raise refusal(verdict)
         if changed:
             self._publish()
+
+    def _verdict_on(self, token: str) -> MoveVerdict | None:
+        """Return why the session `token` may not have it now; None where it may."""
+        held = self._grant
+        if held is None and self._offered:
+            return None
+        if held is None:
+            return _refused(f"{self._local.name} keeps the right to move to itself")
+        if secrets.compare_digest(held.token, token):
+            return None
+        return _refused(f"the right to move is held by {held.name}")
+
+    def _give(self, name: str, token: str, limit_s: float, *, in_process: bool) -> bool:
+        held = self._grant
+        changed = held is None or held.pulse.limit_s != limit_s
+        if held is None:
+            pulse = Pulse(name, limit_s=limit_s, clock=self._clock)
+            self._grant = _Grant(name, token, pulse, in_process)
+        else:
+            held.pulse.beat(self._clock.now_s())  # who asks is alive
+            held.pulse.bear(limit_s)
+            self._grant = replace(held, in_process=in_process)
+        if changed:
+            kept = MOVE_LIMIT_S < limit_s < float("inf")
+            silence = f", who may be silent for {limit_s:g} s" if kept else ""
+            self._why = f"taken by {name}{silence}"
+        return changed
 
     def release(self, token: str, why: str = "") -> None:
         """Give it back, if the session `token` holds it; what moves by it stops."""

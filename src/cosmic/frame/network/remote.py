@@ -15,12 +15,13 @@ _MARK: Final = "__cosmic_remote__"
 
 @dataclass(frozen=True, slots=True)
 class RemoteMark:
-    """What `remote` said of a function."""
+    """What `remote` said of a function; `renews`: it only keeps alive what was begun before."""
 
     moves: bool
     reads: bool
     at_once: bool
     limit_s: float
+    renews: bool = False
 
 
 @overload
@@ -94,8 +95,9 @@ class Offered:
         surplus = [str(name)[:60] for name in arguments if name not in self.parameters]
         missing = self.required.difference(arguments)
         if surplus or missing:
+            said = [name for name in self.parameters if name.isidentifier()]  # the rest is ours
             raise CallRefused(
-                f"{self.name} takes {', '.join(self.parameters) or 'nothing'}; "
+                f"{self.name} takes {', '.join(said) or 'nothing'}; "
                 f"unknown: {', '.join(surplus) or 'none'}, "
                 f"missing: {', '.join(sorted(missing)) or 'none'}"
             )

@@ -431,6 +431,8 @@ class Axis(PlanMovable, Declared):
     ) -> Movement:
         """Begin a motion in gate coordinates; a refusal is how it ends.
 
+        The result is where it arrived, counted from the user's zero.
+
         Parameters
         ----------
         key : str

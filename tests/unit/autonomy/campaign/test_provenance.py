@@ -35,6 +35,19 @@ def made(tmp_path: Path, text: str = "name = 1\n") -> Provenance:
     return Provenance({"platform/platform.toml": file}, {"parameters": {"zoom": 0.58}}, FACTS)
 
 
+def test_a_record_has_no_token_of_a_client(tmp_path: Path) -> None:
+    folder = tmp_path / "campaign"
+    text = '[[network.http.client]]\nname = "desk"\ntoken = "correct horse battery"\n'
+    write_provenance(folder, 1, made(tmp_path, text), "procedure = 1\n")
+    assert not [
+        each for each in folder.rglob("*") if each.is_file() and b"horse" in each.read_bytes()
+    ]
+    (page,) = read_provenance(folder)
+    copy = folder / page["files"]["platform/platform.toml"]["copy"]
+    assert copy.read_text("utf-8") == text.replace("correct horse battery", "")
+    assert changed_files(folder) == ()
+
+
 def test_each_run_keeps_copies_and_hashes_of_its_files(tmp_path: Path) -> None:
     folder = tmp_path / "campaign"
     write_provenance(folder, 1, made(tmp_path), "procedure = 1\n")

@@ -83,6 +83,25 @@ def test_who_may_be_silent_keeps_the_right_and_nothing_that_moves(
     assert not lease.holds("far")
 
 
+def test_whoever_was_watched_otherwise_and_asks_for_signs_of_life_needs_them(
+    lease: StationLease, clock: ManualClock
+) -> None:
+    lease.take("epics", "a", in_process=True)
+    clock.advance(100.0)
+    lease.take("epics", "a", keep_s=5.0)
+    assert lease.holds("a")
+    dead_man = lease.dead_man("a")
+    clock.advance(1.01)
+    assert dead_man.expired
+    clock.advance(4.0)
+    assert not lease.holds("a")
+    lease.take("epics", "a", keep_s=5.0)
+    lease.take("epics", "a", in_process=True)
+    dead_man = lease.dead_man("a")
+    clock.advance(100.0)
+    assert not dead_man.expired
+
+
 def test_signs_of_life_keep_it(lease: StationLease, clock: ManualClock) -> None:
     lease.take("vision", "a")
     dead_man = lease.dead_man("a", 0.3)

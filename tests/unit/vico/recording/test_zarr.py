@@ -68,6 +68,21 @@ def test_xarray_opens_it_with_times_and_positions(tmp_path):
         assert found["left.x_um"].units == "um"
 
 
+@needs_zarr
+@pytest.mark.parametrize("pixel_format", [PixelFormat.MONO8, PixelFormat.MONO12])
+def test_xarray_has_whole_numbers_and_black_pixels_stay_black(tmp_path, pixel_format):
+    import xarray
+
+    file = ImageFile(tmp_path / "run", ImageFormat.ZARR, axes=AXES, rate_hz=2.0)
+    shot = moving(0, pixel_format)
+    black = np.zeros_like(shot.data)
+    file.append(black, row_of(shot, None))
+    file.close(complete=True)
+    with xarray.open_zarr(tmp_path / "run.zarr", consolidated=False) as found:
+        assert found["0"].dtype == black.dtype
+        np.testing.assert_array_equal(found["0"][0], black)
+
+
 def test_ome_says_the_pixel_size_and_the_real_time_between_images(tmp_path):
     recorded(tmp_path / "run")
     attributes = json.loads((tmp_path / "run.zarr" / ".zattrs").read_text())

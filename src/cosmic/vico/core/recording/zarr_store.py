@@ -199,7 +199,8 @@ def _described(shape: Sequence[int], chunks: Sequence[int], kind: str) -> dict[s
         "chunks": list(chunks),
         "dtype": kind,
         "compressor": None,
-        "fill_value": "NaN" if kind == "<f8" else 0,
+        # Where images had one, xarray would take black pixels for missing ones.
+        "fill_value": "NaN" if kind == "<f8" else None,
         "order": "C",
         "filters": None,
         "dimension_separator": "/",
