@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from cosmic.autonomy.procedures.run import ProcedureRun
     from cosmic.autonomy.recorded.operations import OperatorSignal
     from cosmic.autonomy.recorded.steps import RecordedProcedure
-    from cosmic.autonomy.shipped.fibre_handling import FibreHandling, OperationRequest
+    from cosmic.autonomy.shipped.fibre_handling import FibreHandling
+    from cosmic.autonomy.shipped.single_operation import OperationRequest
 
 USUAL_FORCE_UN: Final = 50.0
 _FIBRES: Final = "fibres"
@@ -124,7 +125,7 @@ class FibreOperations(QObject):
     def offer(self, view: CameraView, menu: QMenu, point_px: Pixel) -> None:
         """Add what can be done with the fibre at a pixel, and with the one that is held."""
         from cosmic.autonomy.handling.marked import MarkedFibre
-        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+        from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
 
         found = view.camera.analysis
         near = NEAR_PX / max(abs(view.view.to_screen.m11()), 1e-6)
@@ -230,7 +231,7 @@ class FibreOperations(QObject):
 
     def push(self, force_un: float) -> None:
         """Push the held fibre to a force."""
-        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+        from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
 
         self.begin(OperationRequest(SingleOperation.PUSH, force_un=force_un))
 
@@ -260,13 +261,13 @@ class FibreOperations(QObject):
 
     def close_gently(self, gripper: str) -> None:
         """Close the jaws of a gripper slowly, until they hold."""
-        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+        from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
 
         self.begin(OperationRequest(SingleOperation.CLOSE, gripper))
 
     def undo(self) -> None:
         """Take back what was done last with the held fibre."""
-        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+        from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
 
         self.begin(OperationRequest(SingleOperation.UNDO))
 
@@ -281,7 +282,7 @@ class FibreOperations(QObject):
             return None
         if not self.handling.held_by and not self.handling.may_hold:
             return None
-        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+        from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
 
         pushed = self.handling.last in (SingleOperation.PUSH, SingleOperation.MEASURE)
         if pushed or self.handling.may_hold:
@@ -304,7 +305,7 @@ class FibreOperations(QObject):
         self.ended.emit()
 
     def _offer_next(self) -> None:
-        from cosmic.autonomy.shipped.fibre_handling import UNDO_WORDS, SingleOperation
+        from cosmic.autonomy.shipped.single_operation import UNDO_WORDS, SingleOperation
 
         handling, request = self.handling, self.next_request()
         at_probe = bool(handling.held_by) and handling.at_probe
