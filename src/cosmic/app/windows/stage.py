@@ -77,11 +77,6 @@ class Stage(QWidget):
         """The camera that is shown, large or as inset."""
         return self._cameras[self._camera]
 
-    @property
-    def inset_shown(self) -> bool:
-        """Whether the other picture is shown as inset."""
-        return self._inset_wanted
-
     def set_bar(self, bar: QWidget) -> None:
         """Have `bar` along the lower edge: below the image where there is room, else on it."""
         bar.setParent(self)

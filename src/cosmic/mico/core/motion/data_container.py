@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from threading import Condition
+from threading import RLock
 from typing import Final
 
 from cosmic.frame.clock import WALL
@@ -87,7 +87,7 @@ class DeviceDataContainer:
         self.library_index = library_index
         self._configured = dict(configured)
         self._hold_s = hold_s
-        self._changed = Condition()
+        self._lock = RLock()
         self._positioners: dict[int, PositionerBase] = {}
         self._unclear: set[int] = set()
         self._observers: tuple[Observer, ...] = ()
@@ -115,19 +115,13 @@ class DeviceDataContainer:
 
     def expect(self, channel: int) -> None:
         """Say that an answer about `channel` is awaited."""
-        with self._changed:
+        with self._lock:
             self._unclear.add(channel)
 
     def settle(self, channel: int, kind: PositionerKind | None, reason: str = "") -> None:
         """Say what `channel` has: a kind, or nothing (None)."""
-        with self._changed:
+        with self._lock:
             self._settle(channel, kind, None, reason)
-            self._changed.notify_all()
-
-    def wait_until_clear(self, timeout_s: float) -> bool:
-        """Wait until every expected channel has answered; False after `timeout_s` of wall time."""
-        with self._changed:
-            return self._changed.wait_for(lambda: not self._unclear, timeout_s)
 
     @property
     def clear(self) -> bool:
@@ -214,7 +208,7 @@ class DeviceDataContainer:
 
     def update(self, channel: int, **changes: object) -> PositionerState | None:
         """Change fields of one positioner's state and return it."""
-        with self._changed:
+        with self._lock:
             positioner = self._positioners.get(channel)
             return positioner.update(**changes) if positioner else None
 
@@ -222,7 +216,7 @@ class DeviceDataContainer:
         self, channel: int, travel: CountedTravel | None, position: float, std: float
     ) -> None:
         """Say where an axis without sensor stands; raises as `check_estimate`."""
-        with self._changed:
+        with self._lock:
             positioner = self._positioners.get(channel)
             if positioner is None:
                 raise NotAvailable(f"device {self.device} channel {channel} has no axis")
@@ -231,7 +225,7 @@ class DeviceDataContainer:
 
     def lose(self, reason: str) -> list[PositionerState]:
         """Say that the whole device is gone; positions are worth nothing from now on."""
-        with self._changed:
+        with self._lock:
             return [
                 each.update(
                     present=False,
@@ -244,9 +238,8 @@ class DeviceDataContainer:
 
     def apply(self, event: Event) -> None:
         """Take in one event of the controller; listener thread."""
-        with self._changed:
+        with self._lock:
             state = self._apply(event)
-            self._changed.notify_all()
         for observer in self._observers:
             observer(event, state)
 
