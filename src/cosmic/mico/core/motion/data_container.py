@@ -1,4 +1,7 @@
-"""`DeviceDataContainer`: the thread-safe state of one device's positioners (thesis 6.1.1)."""
+"""What is known of one device: `DeviceDataContainer` keeps it, `DeviceListener` receives it.
+
+Thesis 5.4 and 6.1.1.
+"""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -6,8 +9,12 @@ from dataclasses import dataclass, replace
 from threading import RLock
 from typing import Final
 
+from typing_extensions import override
+
 from cosmic.frame.clock import WALL
-from cosmic.frame.errors import ConfigError, DeviceFault, NotAvailable
+from cosmic.frame.errors import ConfigError, DeviceError, DeviceFault, NotAvailable
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.threads import WorkerThread
 from cosmic.mico.core.motion.orders import COMMON
 from cosmic.mico.core.motion.positioner import (
     Confidence,
@@ -23,6 +30,7 @@ from cosmic.mico.hw.interface import (
     ActivityRead,
     Capabilities,
     Channel,
+    Controller,
     Event,
     Failed,
     PositionerKind,
@@ -40,6 +48,8 @@ logger = logging.getLogger(__name__)
 Observer = Callable[[Event, PositionerState | None], None]
 
 NO_DEVICE: Final = "no device"
+RECEIVE_S: Final = 0.1
+"""How long one receive waits: no call can cancel it, so it bounds how long closing takes."""
 _LOST_POSITION: Final = (DeviceFault.NO_SENSOR,)
 
 
@@ -259,6 +269,49 @@ class DeviceDataContainer:
     def address(self, channel: int) -> Channel:
         """Return the address of `channel` for calls to the controller."""
         return Channel(self.library_index, channel)
+
+
+class DeviceListener(WorkerThread):
+    """Waits for the packets of one device and hands them to its `DeviceDataContainer`.
+
+    Parameters
+    ----------
+    on_lost : callable
+        Told why when the device cannot be reached any more; called in this thread.
+    """
+
+    may_wait = False
+
+    def __init__(
+        self,
+        controller: Controller,
+        container: DeviceDataContainer,
+        policy: FailurePolicy,
+        on_lost: Callable[[DeviceError], None],
+    ) -> None:
+        super().__init__(f"listener {container.device}", policy)
+        self._controller = controller
+        self._container = container
+        self._on_lost = on_lost
+
+    @override
+    def run_body(self) -> None:
+        try:
+            self._listen()
+        except BaseException as exc:
+            self._on_lost(DeviceError(f"its listener failed: {exc!r}"))
+            raise
+
+    def _listen(self) -> None:
+        while not self.end_requested:
+            try:
+                event = self._controller.receive(self._container.library_index, RECEIVE_S)
+            except DeviceError as exc:
+                self._on_lost(exc)
+                return
+            if event is not None:
+                logger.debug("%s", event)
+                self._container.apply(event)
 
 
 def _with_driver(
