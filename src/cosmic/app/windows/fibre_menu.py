@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QMenu
 from cosmic.app.panels.operation_card import OperationCard
 from cosmic.app.panels.scene import ScenePanel
 from cosmic.app.rig import Rig
-from cosmic.app.windows.stage import Stage
+from cosmic.app.windows.central_view import CentralView
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.relay import Relay
 from cosmic.vico.api.coordinate_transform import Pixel
@@ -43,7 +43,7 @@ class FibreOperations(QObject):
     ----------
     rig : Rig
         The platform.
-    stage : Stage
+    central_view : CentralView
         Where cameras are shown, and the card.
     scene : ScenePanel
         Where the path of an operation is drawn before it begins.
@@ -66,12 +66,17 @@ class FibreOperations(QObject):
     replay_wanted = Signal()
 
     def __init__(
-        self, rig: Rig, stage: Stage, scene: ScenePanel, cameras: list[CameraView], parent: QObject
+        self,
+        rig: Rig,
+        central_view: CentralView,
+        scene: ScenePanel,
+        cameras: list[CameraView],
+        parent: QObject,
     ) -> None:
         super().__init__(parent)
-        self._rig, self._stage, self._scene = rig, stage, scene
+        self._rig, self._central_view, self._scene = rig, central_view, scene
         self.card = OperationCard(USUAL_FORCE_UN)
-        stage.set_card(self.card)
+        central_view.set_card(self.card)
         self._relay: Relay[()] | None = None
         self._shown: object = None
         self._worked = False
@@ -81,7 +86,7 @@ class FibreOperations(QObject):
         """What the menu offers to replay on a fibre."""
         self._going_on: OperatorSignal | None = None
         self._asks: Relay[str] = Relay(self._on_asked)
-        self.card.resized.connect(stage.lay_card)
+        self.card.resized.connect(central_view.lay_card)
         self.card.next_requested.connect(self._on_next)
         self.card.undo_requested.connect(self.undo)
         self.card.push_requested.connect(self.push)

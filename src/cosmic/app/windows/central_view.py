@@ -21,7 +21,7 @@ _CARD_ABOVE_PX: Final = 4 * STEP_PX
 """Room below the card, in which the image says where the mouse is."""
 
 
-class Stage(QWidget):
+class CentralView(QWidget):
     """Shows a camera large and the scene as inset, or the other way round; GUI thread.
 
     Only places change: no picture is made anew, so a swap is seen at once.
