@@ -35,7 +35,7 @@ from cosmic.frame.gui.clearance_meter import closeness
 from cosmic.frame.gui.late_panel import LatePanel
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.theme import STEP_PX
-from cosmic.frame.gui.workspaces import Area, Place, Workspace
+from cosmic.frame.gui.workspaces import Area, PanelPlacement, Workspace
 from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.gui.mico_widget import MicoWidget
@@ -67,16 +67,16 @@ _COACH_PX: Final = 17 * STEP_PX
 WATCH_MS: Final = 500
 
 
-def _left(title: str) -> Place:
-    return Place(title, _LEFT, share=0.165, least_px=188, most_px=40 * STEP_PX)
+def _left(title: str) -> PanelPlacement:
+    return PanelPlacement(title, _LEFT, share=0.165, least_px=188, most_px=40 * STEP_PX)
 
 
-def _right(title: str) -> Place:
-    return Place(title, _RIGHT, share=0.195, least_px=212, most_px=50 * STEP_PX)
+def _right(title: str) -> PanelPlacement:
+    return PanelPlacement(title, _RIGHT, share=0.195, least_px=212, most_px=50 * STEP_PX)
 
 
-def _coach(below: str) -> Place:
-    return Place(COACH, _RIGHT, below=below, height_px=_COACH_PX)
+def _coach(below: str) -> PanelPlacement:
+    return PanelPlacement(COACH, _RIGHT, below=below, height_px=_COACH_PX)
 
 
 def workspaces(others: tuple[str, ...] = ()) -> tuple[Workspace, ...]:
@@ -86,19 +86,19 @@ def workspaces(others: tuple[str, ...] = ()) -> tuple[Workspace, ...]:
             SET_UP,
             "Axes, devices, calibrations and configuration",
             (
-                Place(MICO, _LEFT, share=0.8),
-                Place(FIRST_DAY, _LEFT, tabbed=MICO),
-                Place(CALIBRATIONS, _LEFT, tabbed=MICO),
-                Place(DAQCO, _LEFT, tabbed=MICO),
-                Place(CONTROL, _LEFT, tabbed=MICO),
-                *(Place(title, _LEFT, tabbed=MICO) for title in others),
+                PanelPlacement(MICO, _LEFT, share=0.8),
+                PanelPlacement(FIRST_DAY, _LEFT, tabbed=MICO),
+                PanelPlacement(CALIBRATIONS, _LEFT, tabbed=MICO),
+                PanelPlacement(DAQCO, _LEFT, tabbed=MICO),
+                PanelPlacement(CONTROL, _LEFT, tabbed=MICO),
+                *(PanelPlacement(title, _LEFT, tabbed=MICO) for title in others),
                 _right(COACH),
             ),
         ),
         Workspace(
             LOOK,
             "Camera, lens, light, and measuring on the image",
-            (_left(IMAGE), _right(LENS), _coach(LENS), Place(CAMERA, _RIGHT, tabbed=LENS)),
+            (_left(IMAGE), _right(LENS), _coach(LENS), PanelPlacement(CAMERA, _RIGHT, tabbed=LENS)),
             middle=True,
         ),
         Workspace(
@@ -106,9 +106,9 @@ def workspaces(others: tuple[str, ...] = ()) -> tuple[Workspace, ...]:
             "Move one tool: pad, targets, poses, trajectories, gamepad",
             (
                 _left(TOOL),
-                Place(TRAJECTORIES, _LEFT, tabbed=TOOL, shown=False),
-                Place(RECORDER, _LEFT, tabbed=TOOL, shown=False),
-                Place(TELEOPERATION, _LEFT, tabbed=TOOL, shown=False),
+                PanelPlacement(TRAJECTORIES, _LEFT, tabbed=TOOL, shown=False),
+                PanelPlacement(RECORDER, _LEFT, tabbed=TOOL, shown=False),
+                PanelPlacement(TELEOPERATION, _LEFT, tabbed=TOOL, shown=False),
                 _right(FORCE),
                 _coach(FORCE),
             ),
@@ -123,9 +123,9 @@ def workspaces(others: tuple[str, ...] = ()) -> tuple[Workspace, ...]:
         Workspace(
             CAMPAIGN,
             "Many fibres by one recipe",
-            (Place(CAMPAIGN, _LEFT, share=0.8), _right(COACH)),
+            (PanelPlacement(CAMPAIGN, _LEFT, share=0.8), _right(COACH)),
         ),
-        Workspace(RESULTS, "What was recorded", (Place(RESULTS, _LEFT),)),
+        Workspace(RESULTS, "What was recorded", (PanelPlacement(RESULTS, _LEFT),)),
     )
 
 
