@@ -11,10 +11,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.figures import Figure, main, percentile
-from cosmic.mico.core.collision.answer import AxisSpan, Spans
+from cosmic.mico.core.collision.answer import AxisSpan, Spans, pack_spans
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.collision.helper_link import GateProcess
-from cosmic.mico.core.collision.helper_wire import pack_spans
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.collision.scene_loader import load_scene
 from cosmic.mico.core.collision.sweep import Sweep

@@ -19,11 +19,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from statistics import median
 from typing import Final
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 PACKAGE: Final = "cosmic"
 CRUMB_LINES: Final = 100
+LARGEST_LINES: Final = 600
 MIRRORS: Final = ("remote_*.py", "station_*.py", "ports.py", "*_port.py")
 NO_MIRRORS: Final = ("serial_port.py",)
 """A port of the computer, not of a subsystem."""
@@ -215,11 +217,14 @@ def cut(root: Path) -> list[Found]:
     methods = forwarding(modules, same=False)
     classes = sum(isinstance(node, ast.ClassDef) for m in every for node in ast.walk(m.tree))
     ringed = [r for r in rings({m.name: sorted(m.imports) for m in every}) if len(r) > 1]
+    large = [f"{m.name}: {m.lines}" for m in every if m.lines > LARGEST_LINES]
     copied, longest = mirrors(modules), chain(modules, STOREYS)
     inside = f"modules imported by one neighbour only, below {CRUMB_LINES} lines"
     return [
         Found("files in src", len(modules)),
         Found("lines in src", sum(module.lines for module in every)),
+        Found("median lines of a file", int(median(module.lines for module in every))),
+        Found(f"files above {LARGEST_LINES} lines", len(large), tuple(large)),
         Found("classes", classes),
         Found("methods that only ask a part", len(methods), tuple(methods)),
         Found("of these, by the same name or with the same arguments", len(alike), tuple(alike)),

@@ -266,7 +266,7 @@ def steer_with_a_gamepad(scene: Scene) -> None:
 def look_at_a_fibre(scene: Scene) -> None:
     """Show the fibres measured."""
     scene.choose(LOOK)
-    view = scene.tasks.stage.camera
+    view = scene.tasks.central_view.camera
     view.camera.switch("fibres", on=True)
     scene.window.raise_panel("Camera")
     scene.until(lambda: view.camera.analysis is not None)
@@ -315,7 +315,7 @@ def _done(scene: Scene, title: str) -> None:
 
 def _take(scene: Scene, operations: FibreOperations) -> None:
     """Right-click the longest fibre, show what the menu offers, and take it."""
-    view = scene.tasks.stage.camera
+    view = scene.tasks.central_view.camera
     found = view.camera.analysis
     if found is None:
         raise RuntimeError("no fibre was found")
@@ -339,7 +339,7 @@ def tour(scene: Scene) -> None:
     scene.choose(LOOK)
     scene.choose(HANDLE)
     tasks, operations = scene.tasks, scene.tasks.operations
-    view = tasks.stage.camera
+    view = tasks.central_view.camera
     if operations is None or tasks.force is None:
         raise RuntimeError("the window has no operations on fibres")
     tasks.folder.home = scene.folder / "sessions"

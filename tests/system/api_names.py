@@ -38,8 +38,8 @@ from cosmic.autonomy.procedures.operation import OperationFailed, UnitOperation
 from cosmic.autonomy.procedures.run import ProcedureRun, RunState
 from cosmic.autonomy.procedures.times import OperationStatistics, OperationTimes
 from cosmic.autonomy.procedures.tree import NodeEvent, NodeState, NodeView
-from cosmic.autonomy.shipped.fibre_handling import (
-    FibreHandling,
+from cosmic.autonomy.shipped.fibre_handling import FibreHandling
+from cosmic.autonomy.shipped.single_operation import (
     OperationPreview,
     OperationRequest,
     OperationResult,

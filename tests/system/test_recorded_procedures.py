@@ -18,7 +18,7 @@ from cosmic.autonomy.recorded.steps import (
     WaitForOperatorStep,
     load_recorded,
 )
-from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
 from cosmic.twin.truth import read_truth
 from cosmic.vico.core.vision.finding import find_fibres
 

@@ -212,21 +212,14 @@ def build_platform(
     StationAway
         A station does not answer.
     """
-    share_interpreter()
-    share_one_arena()
-    if not tick_finely():
-        logger.warning("Windows keeps its timer resolution of 15.6 ms: waits end up to that late")
+    _prepare_process()
     file, path = load_platform(config)
     for each in missing_packages(file.platform.requires):
         logger.warning("%s: platform.requires: %s is not installed", path, each)
     _check_simulation(file, path, rate=rate, only_simulated=cold or bool(sample or truth or world))
     if not 0 <= seed <= LARGEST_SEED:
         raise ArgumentError(f"seed must be a whole number from 0 to {LARGEST_SEED}, not {seed}")
-    try:
-        # Where anything is real, or runs in another process, time waits for nobody here.
-        clock = RatedClock(rate, waits=file.all_simulated and not uses.stations)
-    except (TypeError, ValueError) as exc:
-        raise ConfigError(f"rate: {exc}") from None
+    clock = _clock(file, rate, uses)
     policy = FailurePolicy()
     guis = {"mico": mico_gui, "daqco": daqco_gui, "vico": vico_gui}
     with ExitStack() as undo:
@@ -266,6 +259,22 @@ def build_platform(
         platform.begin_remote()
         undo.pop_all()
     return platform
+
+
+def _prepare_process() -> None:
+    """Have the interpreter, the memory and the timer of this process serve threads that wait."""
+    share_interpreter()
+    share_one_arena()
+    if not tick_finely():
+        logger.warning("Windows keeps its timer resolution of 15.6 ms: waits end up to that late")
+
+
+def _clock(file: PlatformFile, rate: float, uses: Uses) -> RatedClock:
+    try:
+        # Where anything is real, or runs in another process, time waits for nobody here.
+        return RatedClock(rate, waits=file.all_simulated and not uses.stations)
+    except (TypeError, ValueError) as exc:
+        raise ConfigError(f"rate: {exc}") from None
 
 
 def _wanted(file: PlatformFile, applications: Sequence[str]) -> list[str]:

@@ -8,10 +8,10 @@ from cosmic.vico.core.pixel_map import PixelMap
 from cosmic.vico.core.tool_settings import ToolSettings
 from cosmic.vico.core.vision.tool_types import ExpectedTool
 
-Place = tuple[float, float, float]
+Point = tuple[float, float, float]
 
 
-def tip_um(tool: ToolSettings, positions: Mapping[str, float]) -> Place | None:
+def tip_um(tool: ToolSettings, positions: Mapping[str, float]) -> Point | None:
     """Return where the tip of a tool is, x, y, z on the platform; None while an axis is unknown."""
     x_um, y_um, z_um = tool.tip_um
     try:

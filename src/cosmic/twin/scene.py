@@ -170,20 +170,7 @@ class Scene:
         ConfigError
             A file that `settings` names is missing, broken or does not fit.
         """
-        stages: dict[str, Stage] = {}
-        at_power_up: dict[str, AtPowerUp] = {}
-        for name, stage in settings.stages.items():
-            kind = settings.kinds[stage.kind]
-            start = _somewhere(stage.at_power_up(kind), name, seed) if cold else stage.start
-            stages[name] = Stage(name, kind, start=start, seed=seed)
-            known = kind.sensor and not cold
-            forward = stage.safe_direction == "forward"
-            at_power_up[name] = AtPowerUp(
-                known=known,
-                calibrated=True,
-                scale=kind.high if forward else kind.low,
-                safe_forward=forward,
-            )
+        stages, at_power_up = _stages(settings, seed, cold=cold)
         wiring = tuple(tuple(name or None for name in d.channels) for d in settings.devices)
         files = folder or shipped_config_dir()
         lens, light = TwinLens(settings.lens, seed, cold=cold), TwinLight(settings.light)
@@ -362,6 +349,27 @@ def _kind(settings: TwinSettings, name: str) -> StageKind:
     if name not in settings.kinds:
         raise ValueError(f"the twin's settings have no kind of stage {name!r}")
     return settings.kinds[name]
+
+
+def _stages(
+    settings: TwinSettings, seed: int, *, cold: bool
+) -> tuple[dict[str, Stage], dict[str, AtPowerUp]]:
+    """Return the stages by name, and what the controllers know of each at power-up."""
+    stages: dict[str, Stage] = {}
+    at_power_up: dict[str, AtPowerUp] = {}
+    for name, stage in settings.stages.items():
+        kind = settings.kinds[stage.kind]
+        start = _somewhere(stage.at_power_up(kind), name, seed) if cold else stage.start
+        stages[name] = Stage(name, kind, start=start, seed=seed)
+        known = kind.sensor and not cold
+        forward = stage.safe_direction == "forward"
+        at_power_up[name] = AtPowerUp(
+            known=known,
+            calibrated=True,
+            scale=kind.high if forward else kind.low,
+            safe_forward=forward,
+        )
+    return stages, at_power_up
 
 
 def _somewhere(region: tuple[float, float], name: str, seed: int) -> float:

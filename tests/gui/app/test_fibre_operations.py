@@ -59,7 +59,7 @@ class Hand:
     def menu_at(self, pixel: tuple[float, float]) -> dict[str, QAction]:
         """Right-click a pixel of the image, and return what the menu offers."""
         self.count += 1
-        view = tasks(self._window).stage.camera.view
+        view = tasks(self._window).central_view.camera.view
         point = view.to_screen.map(QPointF(*pixel)).toPoint()
         QApplication.sendEvent(
             view.viewport(),
@@ -102,14 +102,14 @@ def with_fibres(make: Make, qtbot: QtBot, truth: Path | None = None) -> Operator
     window = make(platform, size=(1366, 768))
     assert window.workspaces is not None
     window.workspaces.choose(HANDLE)
-    view = tasks(window).stage.camera.view
+    view = tasks(window).central_view.camera.view
     qtbot.waitUntil(lambda: view.image is not None, timeout=15_000)
     return window
 
 
 def fibre_px(window: OperatorWindow, qtbot: QtBot) -> tuple[float, float]:
     """Wait until a fibre is found, and return the middle of the longest that is certain."""
-    camera = tasks(window).stage.camera.camera
+    camera = tasks(window).central_view.camera.camera
 
     def found() -> bool:
         seen = camera.analysis
@@ -156,7 +156,7 @@ def test_what_cannot_be_done_with_a_fibre_says_why_and_moves_nothing(
     hand.choose(menu["Find fibres"])
     pixel = fibre_px(window, qtbot)
     menu = hand.menu_at(pixel)
-    view = tasks(window).stage.camera
+    view = tasks(window).central_view.camera
     menu["Take with left"].hover()
     assert view.mark.line_px is not None
     assert "Take with left" in view.message.text
@@ -281,7 +281,7 @@ def test_a_fibre_found_at_a_high_zoom_is_refused_before_anything_is_calibrated(
     qtbot.waitUntil(lambda: abs((lens.zoom or 0.0) - 2.0) < 0.01, timeout=30_000)
     coach = coach_button(window)
     qtbot.waitUntil(lambda: coach.isVisible() and coach.text() == "Zoom out")
-    camera = tasks(window).stage.camera.camera
+    camera = tasks(window).central_view.camera.camera
 
     def at_zoom() -> bool:
         seen = camera.analysis

@@ -53,8 +53,8 @@ def test_a_drag_in_the_scene_moves_the_chosen_tool_at_its_height(make: Make, qtb
     wait_until_ready(window, qtbot)
     assert window.workspaces is not None
     window.workspaces.choose(HANDLE)
-    stage, bar = tasks(window).stage, tasks(window).bar
-    stage.show_large("Scene")
+    central_view, bar = tasks(window).central_view, tasks(window).bar
+    central_view.show_large("Scene")
     tasks(window).watch()
     move = bar.findChild(QToolButton, "barMove")
     assert isinstance(move, QToolButton)

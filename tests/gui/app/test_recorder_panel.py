@@ -15,7 +15,7 @@ from cosmic.autonomy.recorded.steps import (
     RecordedProcedure,
     RecordedStep,
 )
-from cosmic.autonomy.shipped.fibre_handling import SingleOperation
+from cosmic.autonomy.shipped.single_operation import SingleOperation
 
 LEFT = Qt.MouseButton.LeftButton
 

@@ -24,8 +24,8 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from cosmic.app.windows.central_view import CentralView
 from cosmic.app.windows.operator_window import OperatorWindow
-from cosmic.app.windows.stage import Stage
 from cosmic.app.windows.tasks import HANDLE, LOOK, MEASURE, SET_UP, TaskLayout
 from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.daqco.gui.limit_dialog import LimitDialog
@@ -73,7 +73,7 @@ def whole(shared_window: OperatorWindow, qtbot: QtBot) -> OperatorWindow:
 def with_image(window: OperatorWindow, qtbot: QtBot) -> None:
     """Wait for the first image; a camera that nobody sees draws none."""
     choose(window, qtbot, LOOK)
-    qtbot.waitUntil(lambda: tasks(window).stage.camera.view.image is not None)
+    qtbot.waitUntil(lambda: tasks(window).central_view.camera.view.image is not None)
 
 
 def tasks(window: OperatorWindow) -> TaskLayout:
@@ -130,7 +130,7 @@ def overlapping(window: QWidget) -> list[str]:
     """Return pairs of widgets of one layout that lie over each other."""
     found: list[str] = []
     for parent in seen(window):
-        if isinstance(parent, Stage) or parent.layout() is None:
+        if isinstance(parent, CentralView) or parent.layout() is None:
             continue
         layout = parent.layout()
         items = [layout.itemAt(row).widget() for row in range(layout.count())]
@@ -190,7 +190,7 @@ def test_the_picture_has_most_of_the_window_and_nothing_is_cut_off(
         # All at once, for each waits until the layout has settled.
         assert settled(qtbot, partial(all_of, looks, window)) == [], name
         if name in WITH_PICTURE:
-            drawn = tasks(window).stage.picture_rect()
+            drawn = tasks(window).central_view.picture_rect()
             share = drawn.width() * drawn.height() / (size[0] * size[1])
             assert share >= 0.45, f"{name}: {share:.1%}"
         stop = window.top_bar.findChild(StopButton)
@@ -443,25 +443,25 @@ def test_a_pose_is_kept_by_a_name_and_offered_with_a_picture(
 
 def test_one_key_swaps_image_and_scene(whole: OperatorWindow, qtbot: QtBot) -> None:
     choose(whole, qtbot, HANDLE)
-    stage = tasks(whole).stage
-    before = stage.camera.geometry()
+    central_view = tasks(whole).central_view
+    before = central_view.camera.geometry()
     qtbot.keyClick(whole, Qt.Key.Key_F6)
-    assert stage.large == "Scene"
-    assert stage.camera.width() < before.width() / 2
+    assert central_view.large == "Scene"
+    assert central_view.camera.width() < before.width() / 2
     qtbot.keyClick(whole, Qt.Key.Key_F6)
-    assert stage.large == "Microscope"
-    assert stage.camera.geometry() == before
+    assert central_view.large == "Microscope"
+    assert central_view.camera.geometry() == before
 
 
 def test_the_drawer_opens_over_the_picture_and_escape_closes_it(
     whole: OperatorWindow, qtbot: QtBot
 ) -> None:
     choose(whole, qtbot, MEASURE)
-    before = tasks(whole).stage.picture_rect()
+    before = tasks(whole).central_view.picture_rect()
     whole.raise_panel("Log")
     QApplication.processEvents()
     assert whole.drawer.open_page == "Log"
-    assert tasks(whole).stage.picture_rect() == before
+    assert tasks(whole).central_view.picture_rect() == before
     whole.setFocus()
     qtbot.keyClick(whole, Qt.Key.Key_Escape)
     assert whole.drawer.open_page == ""
@@ -521,7 +521,7 @@ def test_the_coach_says_what_a_calibration_high_above_the_plate_is_not_good_for(
     choose(whole, qtbot, LOOK)
     words = part(whole.findChild(QWidget, "coach"), "coachWords", QLabel)
     qtbot.waitUntil(lambda: "needs a calibration" in words.text())
-    camera = tasks(whole).stage.camera.camera
+    camera = tasks(whole).central_view.camera.camera
     transform = whole.platform.vico.transform if whole.platform.vico is not None else None
     assert isinstance(transform, PlatformTransform)
     places = [(x, y) for x in (-300.0, 0.0, 300.0) for y in (-300.0, 0.0, 300.0)]

@@ -181,7 +181,7 @@ def gives_way_to_projections_when_it_fails():
 
 def gives_way_when_the_light_does_not_compile():
     scene = made(show=False)
-    for shader in scene.view._stage.shader(stripes=False).shaders:
+    for shader in scene.view._items_view.shader(stripes=False).shaders:
         shader.code = "nonsense"
     scene.show()
     for _ in range(3):

@@ -14,7 +14,7 @@ from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.gui import registry
 from cosmic.mico.gui.card import ConfidenceMark
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI
-from cosmic.mico.gui.consent_dialog import ConsentDialog
+from cosmic.mico.gui.consent_dialogs import ConsentDialog
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.hw.interface import Channel, PositionerKind, PositionRead
 from gui.mico.panels import (

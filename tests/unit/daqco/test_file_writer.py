@@ -280,12 +280,12 @@ import resource, sys
 sys.path.insert(0, sys.argv[2])
 from pathlib import Path
 from unit.daqco.recording_helpers import chunks, header, volts_of
-from cosmic.daqco.core import room
+from cosmic.daqco.core import preallocation
 from cosmic.daqco.core.file_writer import UDaqFileWriter
 from cosmic.frame.clock import WALL
 from cosmic.frame.failure import FailurePolicy
 
-room.STEP_BYTES = 1024 * 1024
+preallocation.STEP_BYTES = 1024 * 1024
 limit, limited_from = int(sys.argv[3]), int(sys.argv[4])
 head = header(tuple(f"c{number}" for number in range(32)), rate_hz=15_000.0)
 volts = volts_of(32, 15_000)

@@ -1,9 +1,9 @@
 """What `cosmic check` finds wrong in a platform file and in the twin it names."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from cosmic.app.configuration.backends import named_backends
-from cosmic.app.configuration.listed import board_mistakes, twin_mistakes
 from cosmic.app.configuration.network import serving
 from cosmic.app.configuration.platform_file import (
     KNOWN_APPLICATIONS,
@@ -13,9 +13,12 @@ from cosmic.app.configuration.platform_file import (
 )
 from cosmic.app.configuration.references import kept_mistakes, misnamed, recipe_mistakes
 from cosmic.app.configuration.scene_fit import misfits
-from cosmic.frame.config import load_model, read_toml
-from cosmic.frame.errors import ConfigError, NotAvailable
-from cosmic.frame.plugins import missing_packages, read_options
+from cosmic.daqco.core.settings import DaqcoSettings
+from cosmic.daqco.hw.factory import make_library
+from cosmic.daqco.hw.interface import BoardInfo
+from cosmic.frame.config import load_model, not_there, read_toml
+from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
+from cosmic.frame.plugins import Kind, has_twin, is_simulated, missing_packages, read_options
 from cosmic.frame.units import format_quantity
 from cosmic.mico.core.settings import MicoSettings, PositionerSettings
 from cosmic.twin.settings import StageKind, TwinSettings
@@ -44,7 +47,7 @@ def find_mistakes(config: str | Path) -> list[str]:
         lines += recipe_mistakes(file, path)
         lines += _network_mistakes(file, path)
         lines += _backend_mistakes(file, path) or [
-            f"{path}: {each}" for each in (*twin_mistakes(file), *board_mistakes(file))
+            f"{path}: {each}" for each in (*_mover_mistakes(file), *_board_mistakes(file))
         ]
     if file is not None and twin is not None:
         lines += _twin_mistakes(file, path, twin, twin_path)
@@ -86,6 +89,61 @@ def _backend_mistakes(file: PlatformFile, path: Path) -> list[str]:
         except ConfigError as exc:
             lines += [f"{path}: {each.section}: {line}" for line in str(exc).splitlines()]
     return lines
+
+
+def _mover_mistakes(file: PlatformFile) -> Iterator[str]:
+    """Yield a line where more than one controller would move the twin."""
+    movers = [each for each in file.mico.backends if has_twin(Kind.CONTROLLER, each)]
+    if len(movers) > 1:
+        yield f"mico: {' and '.join(map(repr, movers))} would both move the twin: leave one"
+
+
+def _board_mistakes(file: PlatformFile) -> list[str]:
+    """Return a line for each board that is there twice, and for each name of one that is not.
+
+    Only simulated backends are asked, for making them opens nothing; which boards a real driver
+    lists is known on the computer that they are in, when they are opened.
+    """
+    settings = file.daqco
+    if settings is None:
+        return []
+    boards: dict[str, BoardInfo] = {}
+    lines: list[str] = []
+    for each in settings.drivers:
+        if not is_simulated(Kind.BOARD, each.backend):
+            continue
+        try:
+            listed = make_library(each.backend, options=each.options).list_boards()
+        except CosmicError as exc:
+            return [f"daqco: {exc}"]
+        lines += [
+            f"daqco: two boards are named {info.name!r}, and one of them is of driver "
+            f"{each.backend!r}: give the boards of one driver another name"
+            for info in listed
+            if info.name in boards
+        ]
+        boards |= {info.name: info for info in listed}
+    if all(is_simulated(Kind.BOARD, each.backend) for each in settings.drivers):
+        lines += _absent_boards(settings, boards)
+    return lines
+
+
+def _absent_boards(settings: DaqcoSettings, boards: dict[str, BoardInfo]) -> Iterator[str]:
+    """Yield a line for each board and input that is named and not there."""
+    named = [(f"channel {each.name!r}", each.board) for each in settings.channel]
+    named += [(f"output {each.name!r}", each.board) for each in settings.output]
+    if settings.camera_trigger is not None:
+        named.append(("camera_trigger", settings.camera_trigger.board))
+    for what, board in named:
+        if board not in boards:
+            yield f"daqco: {what}: {not_there('board', board, boards)}"
+    for each in settings.channel:
+        if each.board in boards and each.input not in boards[each.board].inputs:
+            inputs = boards[each.board].inputs
+            yield (
+                f"daqco: channel {each.name!r}: {each.board} has no input {each.input!r}; it has "
+                f"{inputs[0]} to {inputs[-1]}"
+            )
 
 
 def _named_twin(path: Path) -> str:

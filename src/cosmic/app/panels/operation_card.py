@@ -25,7 +25,7 @@ from cosmic.frame.units import with_micro_signs
 
 if TYPE_CHECKING:
     from cosmic.autonomy.handling.context import HandlingContext
-    from cosmic.autonomy.shipped.fibre_handling import OperationResult
+    from cosmic.autonomy.shipped.single_operation import OperationResult
 
 CARD_PX: Final = 38 * STEP_PX
 LOOK_MS: Final = 150

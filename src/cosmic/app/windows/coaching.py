@@ -8,8 +8,8 @@ from cosmic.app.panels.coach import Rule, Step
 from cosmic.app.panels.force import ForcePanel
 from cosmic.app.panels.tool import ToolPanel
 from cosmic.app.rig import A_CAMPAIGN, Rig
+from cosmic.app.windows.central_view import CentralView
 from cosmic.app.windows.fibre_menu import FibreOperations
-from cosmic.app.windows.stage import Stage
 from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.server_gui import CosmicServerGui
@@ -26,7 +26,7 @@ ZOOMED_IN: Final = 1.05
 class Parts(Protocol):
     """What of the workspaces the rules look at."""
 
-    stage: Stage
+    central_view: CentralView
     tool: ToolPanel
     force: ForcePanel | None
     operations: FibreOperations | None
@@ -146,7 +146,7 @@ class _Rules:
 
     def camera_stopped(self) -> Step | None:
         """Look at the camera shown."""
-        camera = self._parts.stage.camera.camera
+        camera = self._parts.central_view.camera.camera
         if camera.running or camera.problem:
             return None
         return Step(
@@ -199,7 +199,7 @@ class _Rules:
 
     def _choose_fibre(self, operations: FibreOperations) -> Step:
         """Come to a fibre that can be clicked: found, in sight, chosen."""
-        view, failed = self._parts.stage.camera, operations.failed
+        view, failed = self._parts.central_view.camera, operations.failed
         if not operations.finding(view):
             text = "To take a fibre, have the fibres found, then right-click one in the image."
             return Step(text, "Find fibres", lambda: operations.find(view, on=True))
@@ -260,7 +260,7 @@ class _Rules:
         return Step("All axes are ready. Look at the plate next.", "Look", self._go("Look"))
 
     def _look(self) -> Step:
-        camera = self._parts.stage.camera.camera
+        camera = self._parts.central_view.camera.camera
         problem = camera.calibration_problem
         if problem and camera.calibrated:
             text = (

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QMenu
 from cosmic.app.panels.operation_card import OperationCard
 from cosmic.app.panels.scene import ScenePanel
 from cosmic.app.rig import Rig
-from cosmic.app.windows.stage import Stage
+from cosmic.app.windows.central_view import CentralView
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.relay import Relay
 from cosmic.vico.api.coordinate_transform import Pixel
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from cosmic.autonomy.procedures.run import ProcedureRun
     from cosmic.autonomy.recorded.operations import OperatorSignal
     from cosmic.autonomy.recorded.steps import RecordedProcedure
-    from cosmic.autonomy.shipped.fibre_handling import FibreHandling, OperationRequest
+    from cosmic.autonomy.shipped.fibre_handling import FibreHandling
+    from cosmic.autonomy.shipped.single_operation import OperationRequest
 
 USUAL_FORCE_UN: Final = 50.0
 _FIBRES: Final = "fibres"
@@ -42,7 +43,7 @@ class FibreOperations(QObject):
     ----------
     rig : Rig
         The platform.
-    stage : Stage
+    central_view : CentralView
         Where cameras are shown, and the card.
     scene : ScenePanel
         Where the path of an operation is drawn before it begins.
@@ -65,12 +66,17 @@ class FibreOperations(QObject):
     replay_wanted = Signal()
 
     def __init__(
-        self, rig: Rig, stage: Stage, scene: ScenePanel, cameras: list[CameraView], parent: QObject
+        self,
+        rig: Rig,
+        central_view: CentralView,
+        scene: ScenePanel,
+        cameras: list[CameraView],
+        parent: QObject,
     ) -> None:
         super().__init__(parent)
-        self._rig, self._stage, self._scene = rig, stage, scene
+        self._rig, self._central_view, self._scene = rig, central_view, scene
         self.card = OperationCard(USUAL_FORCE_UN)
-        stage.set_card(self.card)
+        central_view.set_card(self.card)
         self._relay: Relay[()] | None = None
         self._shown: object = None
         self._worked = False
@@ -80,7 +86,7 @@ class FibreOperations(QObject):
         """What the menu offers to replay on a fibre."""
         self._going_on: OperatorSignal | None = None
         self._asks: Relay[str] = Relay(self._on_asked)
-        self.card.resized.connect(stage.lay_card)
+        self.card.resized.connect(central_view.lay_card)
         self.card.next_requested.connect(self._on_next)
         self.card.undo_requested.connect(self.undo)
         self.card.push_requested.connect(self.push)
@@ -124,7 +130,7 @@ class FibreOperations(QObject):
     def offer(self, view: CameraView, menu: QMenu, point_px: Pixel) -> None:
         """Add what can be done with the fibre at a pixel, and with the one that is held."""
         from cosmic.autonomy.handling.marked import MarkedFibre
-        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+        from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
 
         found = view.camera.analysis
         near = NEAR_PX / max(abs(view.view.to_screen.m11()), 1e-6)
@@ -230,7 +236,7 @@ class FibreOperations(QObject):
 
     def push(self, force_un: float) -> None:
         """Push the held fibre to a force."""
-        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+        from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
 
         self.begin(OperationRequest(SingleOperation.PUSH, force_un=force_un))
 
@@ -260,13 +266,13 @@ class FibreOperations(QObject):
 
     def close_gently(self, gripper: str) -> None:
         """Close the jaws of a gripper slowly, until they hold."""
-        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+        from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
 
         self.begin(OperationRequest(SingleOperation.CLOSE, gripper))
 
     def undo(self) -> None:
         """Take back what was done last with the held fibre."""
-        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+        from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
 
         self.begin(OperationRequest(SingleOperation.UNDO))
 
@@ -281,7 +287,7 @@ class FibreOperations(QObject):
             return None
         if not self.handling.held_by and not self.handling.may_hold:
             return None
-        from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+        from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
 
         pushed = self.handling.last in (SingleOperation.PUSH, SingleOperation.MEASURE)
         if pushed or self.handling.may_hold:
@@ -304,7 +310,7 @@ class FibreOperations(QObject):
         self.ended.emit()
 
     def _offer_next(self) -> None:
-        from cosmic.autonomy.shipped.fibre_handling import UNDO_WORDS, SingleOperation
+        from cosmic.autonomy.shipped.single_operation import UNDO_WORDS, SingleOperation
 
         handling, request = self.handling, self.next_request()
         at_probe = bool(handling.held_by) and handling.at_probe

@@ -341,14 +341,14 @@ class OperatorWindow(CosmicServerGui):
     @override
     def raise_panel(self, title: str) -> None:
         """Show the panel `title`, or that picture, and bring it to the front."""
-        stage = self._tasks.stage if self._tasks is not None else None
-        if stage is None or self.workspaces is None or title not in stage.titles:
+        central_view = self._tasks.central_view if self._tasks is not None else None
+        if central_view is None or self.workspaces is None or title not in central_view.titles:
             super().raise_panel(title)
             return
         shown = {each.name: each for each in self.workspaces.all}[self.workspaces.current]
         if not shown.middle:
             self.workspaces.choose(HANDLE)
-        stage.show_large(title)
+        central_view.show_large(title)
 
     @property
     def mode(self) -> str:

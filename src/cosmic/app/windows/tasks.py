@@ -26,16 +26,16 @@ from cosmic.app.results.session_log import SessionLog
 from cosmic.app.results.sessions import SessionFolder
 from cosmic.app.rig import Rig
 from cosmic.app.windows.alarm_watch import AlarmWatch, Quantity, computer_quantities
+from cosmic.app.windows.central_view import SCENE_TITLE, CentralView, column_of
 from cosmic.app.windows.fibre_menu import FibreOperations
 from cosmic.app.windows.lens_start import LensStart
 from cosmic.app.windows.picture_move import PictureMove
-from cosmic.app.windows.stage import SCENE_TITLE, Stage, column_of
 from cosmic.frame.failure import Failure
 from cosmic.frame.gui.clearance_meter import closeness
 from cosmic.frame.gui.late_panel import LatePanel
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.theme import STEP_PX
-from cosmic.frame.gui.workspaces import Area, Place, Workspace
+from cosmic.frame.gui.workspaces import Area, PanelPlacement, Workspace
 from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.gui.mico_widget import MicoWidget
@@ -67,16 +67,16 @@ _COACH_PX: Final = 17 * STEP_PX
 WATCH_MS: Final = 500
 
 
-def _left(title: str) -> Place:
-    return Place(title, _LEFT, share=0.165, least_px=188, most_px=40 * STEP_PX)
+def _left(title: str) -> PanelPlacement:
+    return PanelPlacement(title, _LEFT, share=0.165, least_px=188, most_px=40 * STEP_PX)
 
 
-def _right(title: str) -> Place:
-    return Place(title, _RIGHT, share=0.195, least_px=212, most_px=50 * STEP_PX)
+def _right(title: str) -> PanelPlacement:
+    return PanelPlacement(title, _RIGHT, share=0.195, least_px=212, most_px=50 * STEP_PX)
 
 
-def _coach(below: str) -> Place:
-    return Place(COACH, _RIGHT, below=below, height_px=_COACH_PX)
+def _coach(below: str) -> PanelPlacement:
+    return PanelPlacement(COACH, _RIGHT, below=below, height_px=_COACH_PX)
 
 
 def workspaces(others: tuple[str, ...] = ()) -> tuple[Workspace, ...]:
@@ -86,19 +86,19 @@ def workspaces(others: tuple[str, ...] = ()) -> tuple[Workspace, ...]:
             SET_UP,
             "Axes, devices, calibrations and configuration",
             (
-                Place(MICO, _LEFT, share=0.8),
-                Place(FIRST_DAY, _LEFT, tabbed=MICO),
-                Place(CALIBRATIONS, _LEFT, tabbed=MICO),
-                Place(DAQCO, _LEFT, tabbed=MICO),
-                Place(CONTROL, _LEFT, tabbed=MICO),
-                *(Place(title, _LEFT, tabbed=MICO) for title in others),
+                PanelPlacement(MICO, _LEFT, share=0.8),
+                PanelPlacement(FIRST_DAY, _LEFT, tabbed=MICO),
+                PanelPlacement(CALIBRATIONS, _LEFT, tabbed=MICO),
+                PanelPlacement(DAQCO, _LEFT, tabbed=MICO),
+                PanelPlacement(CONTROL, _LEFT, tabbed=MICO),
+                *(PanelPlacement(title, _LEFT, tabbed=MICO) for title in others),
                 _right(COACH),
             ),
         ),
         Workspace(
             LOOK,
             "Camera, lens, light, and measuring on the image",
-            (_left(IMAGE), _right(LENS), _coach(LENS), Place(CAMERA, _RIGHT, tabbed=LENS)),
+            (_left(IMAGE), _right(LENS), _coach(LENS), PanelPlacement(CAMERA, _RIGHT, tabbed=LENS)),
             middle=True,
         ),
         Workspace(
@@ -106,9 +106,9 @@ def workspaces(others: tuple[str, ...] = ()) -> tuple[Workspace, ...]:
             "Move one tool: pad, targets, poses, trajectories, gamepad",
             (
                 _left(TOOL),
-                Place(TRAJECTORIES, _LEFT, tabbed=TOOL, shown=False),
-                Place(RECORDER, _LEFT, tabbed=TOOL, shown=False),
-                Place(TELEOPERATION, _LEFT, tabbed=TOOL, shown=False),
+                PanelPlacement(TRAJECTORIES, _LEFT, tabbed=TOOL, shown=False),
+                PanelPlacement(RECORDER, _LEFT, tabbed=TOOL, shown=False),
+                PanelPlacement(TELEOPERATION, _LEFT, tabbed=TOOL, shown=False),
                 _right(FORCE),
                 _coach(FORCE),
             ),
@@ -123,9 +123,9 @@ def workspaces(others: tuple[str, ...] = ()) -> tuple[Workspace, ...]:
         Workspace(
             CAMPAIGN,
             "Many fibres by one recipe",
-            (Place(CAMPAIGN, _LEFT, share=0.8), _right(COACH)),
+            (PanelPlacement(CAMPAIGN, _LEFT, share=0.8), _right(COACH)),
         ),
-        Workspace(RESULTS, "What was recorded", (Place(RESULTS, _LEFT),)),
+        Workspace(RESULTS, "What was recorded", (PanelPlacement(RESULTS, _LEFT),)),
     )
 
 
@@ -163,17 +163,17 @@ class TaskLayout(QObject):
         gui.offer_table()
         cameras = {view.windowTitle(): view for view in images.cameras.values()}
         self._parts = {title: view.give_parts() for title, view in cameras.items()}
-        self.stage = Stage(cameras, scene)
+        self.central_view = CentralView(cameras, scene)
         self._scene = scene
         self.bar = ImageBar(rig.vico, {title: each.exposure for title, each in self._parts.items()})
-        self.stage.set_bar(self.bar)
+        self.central_view.set_bar(self.bar)
         self.tool = ToolPanel(gui)
         views = list(cameras.values())
         self._picture_move = PictureMove(rig, gui, self.tool, scene, views, self)
         self.operations: FibreOperations | None = None
         self.recorder: LatePanel[RecorderPanel] | None = None
         if can_run(platform):
-            self.operations = FibreOperations(rig, self.stage, scene, views, self)
+            self.operations = FibreOperations(rig, self.central_view, scene, views, self)
             self.recorder = LatePanel(self._make_recorder)
             self.tool.offer_gently()
             self.tool.close_gently_requested.connect(self.operations.close_gently)
@@ -186,7 +186,7 @@ class TaskLayout(QObject):
         self._log: SessionLog | None = None
         self._add_panels()
         others = tuple(each.title for each in platform.others.values())
-        window.use_workspaces(workspaces(others), self.stage)
+        window.use_workspaces(workspaces(others), self.central_view)
         self._add_drawer()
         self._settings = settings
         self._lens_start = LensStart(rig, self)
@@ -220,7 +220,7 @@ class TaskLayout(QObject):
 
             return ProcedureRecorder(self._rig, operations.handling, lambda: operations.marked)
 
-        tools = tuple(self.stage.camera.camera.targets)
+        tools = tuple(self.central_view.camera.camera.targets)
         panel = RecorderPanel(watch, lambda: ("platform", "fibre", "plate", *tools), self.folder)
         panel.replay_requested.connect(lambda found: operations.replay(found, self.folder))
         panel.continued.connect(operations.go_on)
@@ -267,15 +267,15 @@ class TaskLayout(QObject):
         drawer.add_page(HISTORY, HistoryPanel(self._gui), "Movements that can be taken back")
 
     def _connect(self) -> None:
-        stage, bar, window = self.stage, self.bar, self._window
-        bar.camera_chosen.connect(stage.show_large)
-        bar.swap_requested.connect(stage.swap)
-        bar.fit_requested.connect(lambda: stage.camera.view.fit())
-        bar.inset_toggled.connect(stage.set_inset_shown)
+        central_view, bar, window = self.central_view, self.bar, self._window
+        bar.camera_chosen.connect(central_view.show_large)
+        bar.swap_requested.connect(central_view.swap)
+        bar.fit_requested.connect(lambda: central_view.camera.view.fit())
+        bar.inset_toggled.connect(central_view.set_inset_shown)
         bar.move_toggled.connect(self._on_move_toggled)
         self.tool.tool_chosen.connect(self._on_tool_chosen)
-        bar.reported.connect(lambda text: stage.camera.say(text))
-        stage.changed.connect(self._on_large_changed)
+        bar.reported.connect(lambda text: central_view.camera.say(text))
+        central_view.changed.connect(self._on_large_changed)
         self.book.changed.connect(self._on_alarms_changed)
         window.top_bar.alarms_clicked.connect(lambda: window.raise_panel(ALARMS))
         made = window.workspaces
@@ -295,7 +295,7 @@ class TaskLayout(QObject):
 
     def _on_move_toggled(self, on: bool) -> None:
         """Have the mouse move the chosen tool in both pictures, until that is put away."""
-        view, name = self.stage.camera, self.tool.tool.name
+        view, name = self.central_view.camera, self.tool.tool.name
         self._scene.set_moving(on)
         if on and not view.camera.calibration_problem and name in view.camera.targets:
             view.row.target_chosen.emit(name)
@@ -304,7 +304,7 @@ class TaskLayout(QObject):
         self._show_move()
 
     def _on_tool_chosen(self, name: str) -> None:
-        view = self.stage.camera
+        view = self.central_view.camera
         if view.tools.target and name in view.camera.targets:
             view.row.target_chosen.emit(name)
         elif view.tools.target:
@@ -312,8 +312,8 @@ class TaskLayout(QObject):
         self._show_move()
 
     def _show_move(self) -> None:
-        view, name = self.stage.camera, self.tool.tool.name
-        in_scene = self.stage.large == SCENE_TITLE
+        view, name = self.central_view.camera, self.tool.tool.name
+        in_scene = self.central_view.large == SCENE_TITLE
         problem = "" if in_scene else view.camera.calibration_problem
         if not problem and name not in view.camera.targets:
             problem = f"the {name} is no tool that the image knows"
@@ -343,7 +343,7 @@ class TaskLayout(QObject):
             configured=tuple(self._platform.file.mico.kinds),
             force=self.force is not None,
             tool=lambda: self.tool.tool.name,
-            camera=lambda: self.stage.camera.camera,
+            camera=lambda: self.central_view.camera.camera,
             folder=self.folder,
             click=self._try_click,
         ).steps
@@ -431,7 +431,7 @@ class TaskLayout(QObject):
     def watch(self) -> None:
         """Look at what raises alarms and is not told by itself."""
         self._show_move()
-        self._picture_move.show_directions(self.stage.camera)
+        self._picture_move.show_directions(self.central_view.camera)
         self._watch_margin()
         self._alarms.look(self._quantities())
         if self.force is not None:

@@ -37,7 +37,6 @@ from cosmic.autonomy.recorded.steps import (
     WaitForForceStep,
     WaitForOperatorStep,
 )
-from cosmic.autonomy.shipped.fibre_handling import SingleOperation
 from cosmic.autonomy.shipped.single import (
     build_bring,
     build_measure,
@@ -45,6 +44,7 @@ from cosmic.autonomy.shipped.single import (
     build_put_away,
     build_take,
 )
+from cosmic.autonomy.shipped.single_operation import SingleOperation
 from cosmic.frame.errors import ConfigError, DeviceTimeout
 from cosmic.mico.core.motion.positioner import positions_of
 from cosmic.vico.core.pixel_map import Floats

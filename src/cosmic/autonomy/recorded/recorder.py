@@ -16,7 +16,8 @@ from cosmic.autonomy.recorded.steps import (
     RecordedStep,
     RecordStep,
 )
-from cosmic.autonomy.shipped.fibre_handling import FibreHandling, SingleOperation
+from cosmic.autonomy.shipped.fibre_handling import FibreHandling
+from cosmic.autonomy.shipped.single_operation import SingleOperation
 from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.vico.hw.peripherals import LensAxis
 

@@ -9,7 +9,7 @@ import tomlkit
 from pydantic import Field, ValidationError
 from typing_extensions import override
 
-from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
 from cosmic.frame.config import StrictModel
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.kept_file import write_whole

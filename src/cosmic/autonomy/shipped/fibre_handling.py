@@ -1,23 +1,19 @@
 """`FibreHandling`: fibres handled by hand, one operation at a time, each a run of a procedure."""
 
 import logging
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 from threading import RLock
 from typing import Final, Protocol, get_args
 
 from typing_extensions import override
 
-from cosmic.autonomy.bending.result import BendingResult
-from cosmic.autonomy.campaign.formatting import EI_LABEL, interval, stiffness, with_interval
 from cosmic.autonomy.handling.context import Applications, HandlingContext, vision_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.marked import MarkedFibre, approach_to
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.single import CloseGently, PushToForce, is_at_probe
-from cosmic.autonomy.procedures.failures import STOPPED, ProcedureAborted, ProcedureStopped
+from cosmic.autonomy.procedures.failures import STOPPED
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun, RunState
 from cosmic.autonomy.shipped.single import (
@@ -31,6 +27,20 @@ from cosmic.autonomy.shipped.single import (
     build_retract,
     build_take,
 )
+from cosmic.autonomy.shipped.single_operation import (
+    IN_DOUBT,
+    PUSHES,
+    UNDO_WORDS,
+    OperationPreview,
+    OperationRequest,
+    OperationResult,
+    interruption,
+    outcome,
+    untrusted,
+)
+
+# Recorded procedures that were written as scripts take it from here.
+from cosmic.autonomy.shipped.single_operation import SingleOperation as SingleOperation
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.events import Event, Unsubscribe
 from cosmic.mico.api.application import MicoApplication
@@ -39,98 +49,10 @@ from cosmic.mico.core.motion.positioner import positions_of
 
 logger = logging.getLogger(__name__)
 
-USUAL_FORCE_UN: Final = 50.0
-IN_DOUBT: Final = "in doubt"
-ENDED: Final = "ended"
-"""What an operation is called that whoever watched over it has ended."""
 GRIPPERS: Final[tuple[str, ...]] = get_args(HandlingSettings.model_fields["gripper"].annotation)
 
 MORE_ZOOM: Final = 1.05
 """So far beyond a zoom an image still counts as taken at it."""
-
-
-class SingleOperation(StrEnum):
-    """What can be done with a fibre by itself; the value is the word."""
-
-    TAKE = "take"
-    BRING = "bring to the probe"
-    PUSH = "push"
-    MEASURE = "measure"
-    PUT_AWAY = "put away"
-    UNDO = "undo"
-    CLOSE = "close gently"
-
-
-PUSHES: Final = frozenset({SingleOperation.PUSH, SingleOperation.MEASURE})
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class OperationRequest:
-    """One operation that is wanted.
-
-    Attributes
-    ----------
-    gripper : str
-        Which one takes the fibre; every later operation is done with that one.
-    force_un : float
-        How far to push.
-    marked : MarkedFibre or None
-        The fibre to be taken.
-    """
-
-    operation: SingleOperation
-    gripper: str = ""
-    force_un: float = USUAL_FORCE_UN
-    marked: MarkedFibre | None = None
-
-    @property
-    def title(self) -> str:
-        """What it is called in the window."""
-        if self.operation is SingleOperation.TAKE:
-            return f"Take with {self.gripper}"
-        if self.operation is SingleOperation.PUSH:
-            return f"Push to {self.force_un:g} µN"
-        return self.operation.value.capitalize()
-
-
-@dataclass(frozen=True, slots=True)
-class OperationResult:
-    """How an operation ended.
-
-    Attributes
-    ----------
-    good : bool
-        It did what it should.
-    text : str
-        A sentence: what was found, or why it was refused or failed.
-    values : tuple of (str, str)
-        What was measured: a name, and the value with its 95 % interval and unit.
-    interrupted : str
-        "stopped" by the stop, "ended" by whoever watched over it, or "in doubt" where the jaws were
-        opened by no operation; empty where it was none of them.
-    """
-
-    title: str
-    good: bool
-    text: str
-    values: tuple[tuple[str, str], ...] = ()
-    interrupted: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class OperationPreview:
-    """What an operation would do.
-
-    Attributes
-    ----------
-    text : str
-        In a sentence.
-    poses : tuple of mapping
-        Where all axes would be, one after the other, from where they are now; um or deg.
-    """
-
-    text: str
-    poses: tuple[Mapping[str, float], ...] = ()
 
 
 class MakeRun(Protocol):
@@ -545,8 +467,7 @@ class FibreHandling:
         work = run.work
         work.shared.unsuitable = []
         if run.failure is None:
-            closed = request.operation is SingleOperation.CLOSE
-            values, text = _closed(work, closing) if closed else _found(request, work, push)
+            values, text = outcome(request, work, push, closing)
             if doubted and work.fibre is None:
                 text = f"{work.settings.gripper} is empty; where the fibre came off is not known."
             result = OperationResult(request.title, good=True, text=text, values=values)
@@ -556,14 +477,14 @@ class FibreHandling:
                 request.title,
                 good=False,
                 text=self._failed(run),
-                values=_doubtful(work),
-                interrupted=_interrupted(run),
+                values=untrusted(work),
+                interrupted=interruption(run),
             )
         self._end(result)
 
     def _failed(self, run: ProcedureRun[HandlingContext]) -> str:
         """Return why a run failed, what is held all the same, and what to do."""
-        interrupted = _interrupted(run)
+        interrupted = interruption(run)
         text = str(run.failure)
         if interrupted == STOPPED:
             reason = self._rig.mico.stop_state.reason
@@ -613,7 +534,7 @@ class FibreHandling:
                 f"Replay {run.name}",
                 good=False,
                 text=self._failed(run),
-                interrupted=_interrupted(run),
+                interrupted=interruption(run),
             )
         self._end(result)
 
@@ -648,12 +569,6 @@ def _nothing() -> None:
     return None
 
 
-UNDO_WORDS: Final[Mapping[SingleOperation, str]] = {
-    SingleOperation.TAKE: "The fibre is laid where it was taken from.",
-    SingleOperation.BRING: "The probe draws back, then the fibre is carried back.",
-    SingleOperation.PUSH: "The probe draws back from the fibre; nothing else moves.",
-    SingleOperation.MEASURE: "The probe draws back from the fibre; nothing else moves.",
-}
 _UNDO: Final[Mapping[SingleOperation, Callable[[], Procedure[HandlingContext]]]] = {
     SingleOperation.TAKE: build_lay_back,
     SingleOperation.BRING: build_carry_back,
@@ -666,8 +581,6 @@ _PLAIN: Final[Mapping[SingleOperation, Callable[[], Procedure[HandlingContext]]]
     SingleOperation.PUT_AWAY: build_put_away,
 }
 
-Values = tuple[tuple[str, str], ...]
-
 
 def _forget_moves(rig: Applications) -> None:
     """Have Undo of movements begin anew: what an operation did is taken back by operations.
@@ -677,71 +590,3 @@ def _forget_moves(rig: Applications) -> None:
     application = rig.mico.application
     if isinstance(application, MicoApplication):
         application.undo.forget_all()
-
-
-def _interrupted(run: ProcedureRun[HandlingContext]) -> str:
-    if isinstance(run.failure, ProcedureStopped):
-        return STOPPED
-    return ENDED if isinstance(run.failure, ProcedureAborted) else ""
-
-
-def _found(
-    request: OperationRequest, work: HandlingContext, push: PushToForce
-) -> tuple[Values, str]:
-    fibre, operation = work.fibre, request.operation
-    if fibre is None:
-        gone = "laid back" if operation is SingleOperation.UNDO else "put away"
-        return (), f"The fibre is {gone}; {work.settings.gripper} is empty."
-    if operation is SingleOperation.TAKE:
-        return _size(fibre), f"{work.settings.gripper} holds fibre {fibre.number}."
-    if operation is SingleOperation.BRING:
-        return (("free length", f"{fibre.free_um:.0f} µm"),), "The fibre is before the probe."
-    if operation is SingleOperation.PUSH and push.pushed is not None:
-        return _pushed(push), f"The fibre pushed back with {push.pushed.force_un:.1f} µN."
-    if operation is SingleOperation.MEASURE and fibre.bending is not None:
-        return _stiffness(fibre.bending), "The bending stiffness is measured."
-    return (), f"Taken back; {work.settings.gripper} still holds the fibre."
-
-
-def _closed(work: HandlingContext, closing: CloseGently) -> tuple[Values, str]:
-    state = work.mico[work.gripper.gap_axis].details
-    opening = math.nan if state.position is None else state.position
-    values = [("opening", f"{with_interval(opening, state.std)} µm")]
-    text = "The jaws have made all their steps: they are closed, or hold what is between."
-    if closing.felt_un is not None:
-        values.append(("force", f"{closing.felt_un:+.1f} µN"))
-        text = "Closing ended: a force was felt."
-    return tuple(values), text
-
-
-def _size(fibre: HeldFibre) -> Values:
-    return (
-        ("length", f"{with_interval(fibre.length_um, fibre.length_std_um)} µm"),
-        ("width", f"{with_interval(fibre.width_um, fibre.width_std_um, 1)} µm"),
-        ("curl", with_interval(fibre.curl, fibre.curl_std, 3)),
-    )
-
-
-def _pushed(push: PushToForce) -> Values:
-    found = push.pushed
-    if found is None:
-        return ()
-    return (
-        ("force (noise)", f"{with_interval(found.force_un, found.force_std_un, 2)} µN"),
-        ("bend", f"{found.bend_um:.1f} µm, span {found.span_um:.0f} µm"),
-        ("stiffness", f"{with_interval(found.fit.k_un_um, found.fit.k_std_un_um, 2)} µN/µm"),
-    )
-
-
-def _stiffness(result: BendingResult) -> Values:
-    if not math.isfinite(result.ei_n_m2):
-        return ()
-    bounds = interval(result.ei_low_n_m2, result.ei_high_n_m2)
-    return (("EI", f"{stiffness(result.ei_n_m2)} ({bounds}, 95 %) {EI_LABEL}"),)
-
-
-def _doubtful(work: HandlingContext) -> Values:
-    fibre = work.fibre
-    if fibre is None or fibre.bending is None or fibre.bending.trusted:
-        return ()
-    return tuple((f"{name}, not trusted", value) for name, value in _stiffness(fibre.bending))

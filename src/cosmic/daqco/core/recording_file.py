@@ -11,6 +11,7 @@ import numpy as np
 from cosmic.daqco.core import recording_format as form
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.nexus import NexusEntry
+from cosmic.daqco.core.preallocation import TABLES_BYTES, Preallocation, trim
 from cosmic.daqco.core.recording_format import (
     AxisPosition,
     Overrun,
@@ -18,7 +19,6 @@ from cosmic.daqco.core.recording_format import (
     RecordedExposure,
     RecordingHeader,
 )
-from cosmic.daqco.core.room import TABLES_BYTES, Room, cut
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.errors import RecordingError, RecordingExistsError
 from cosmic.frame.process_mark import FileHold, own_mark
@@ -85,7 +85,7 @@ class RecordingFile:
         self._file = self._created(overwrite=overwrite)
         self._size_bytes = 0
         held_bytes = self._block.nbytes + self._values.nbytes + self._times.nbytes
-        self._room = Room(self._file, path, 2 * held_bytes + TABLES_BYTES)
+        self._preallocation = Preallocation(self._file, path, 2 * held_bytes + TABLES_BYTES)
         self._begin()
 
     @property
@@ -101,7 +101,7 @@ class RecordingFile:
     @property
     def size_bytes(self) -> int:
         """How long the file is."""
-        return self._room.used_bytes if self._file else self._size_bytes
+        return self._preallocation.used_bytes if self._file else self._size_bytes
 
     @property
     def lost(self) -> int:
@@ -179,7 +179,7 @@ class RecordingFile:
         self._flushes += 1
         if self._closing or self._flushes % SELDOM == 0:
             self._write_values()
-        self._take_room()
+        self._preallocate()
         self._nexus.flush()
         self._write_tables()
         self._file.flush()
@@ -190,11 +190,11 @@ class RecordingFile:
             return
         self._closing = True
         self.flush()
-        self._size_bytes = self._room.used_bytes
+        self._size_bytes = self._preallocation.used_bytes
         if complete:
             self._file["complete"][()] = 1
         self._file.close()
-        cut(self._path)
+        trim(self._path)
         if self._hold is not None:
             self._hold.release()
 
@@ -223,7 +223,7 @@ class RecordingFile:
 
     def _begin(self) -> None:
         try:
-            self._room.need()
+            self._preallocation.need()
         except OSError as exc:
             self._file.close()
             self._path.unlink(missing_ok=True)
@@ -311,7 +311,7 @@ class RecordingFile:
         self._scaled = self._filled
 
     def _write_volts(self) -> None:
-        self._take_room()
+        self._preallocate()
         self._volts.resize(self.samples, axis=1)
         for channel, row in enumerate(self._block):
             self._volts.id.write_direct_chunk((channel, self._columns), row)
@@ -319,16 +319,16 @@ class RecordingFile:
     def _write_values(self) -> None:
         """Write what NeXus has of the block."""
         if self._shown < self._filled:
-            self._take_room()
+            self._preallocate()
             self._scale_block()
             self._nexus.write(self._columns, self.samples, self._times, self._values)
             self._shown = self._filled
 
-    def _take_room(self) -> None:
+    def _preallocate(self) -> None:
         if self._closing:  # what the margin is for
             return
         try:
-            self._room.need()
+            self._preallocation.need()
         except OSError as exc:
             raise self._no_room(exc) from exc
 

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QHideEvent, QShowEvent
+from PySide6.QtGui import QHideEvent, QScreen, QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QVBoxLayout, QWidget
 
 from cosmic.daqco.api.daqco import Daqco
@@ -17,7 +17,6 @@ from cosmic.daqco.gui.limit_banner import LimitBanner
 from cosmic.daqco.gui.plot.chart import Chart, Trace
 from cosmic.daqco.gui.plot.inbox import ChunkInbox
 from cosmic.daqco.gui.plot.marks import Cursors, LimitLines
-from cosmic.daqco.gui.plot.refresh import shown_rate_hz
 from cosmic.daqco.gui.plot.unit_ranges import UnitRanges
 from cosmic.daqco.gui.plot.units import AxisRange
 from cosmic.daqco.gui.scaling_bar import ScalingBar
@@ -34,6 +33,7 @@ UNSEEN_MS: Final = 1000
 OLD_S: Final = 1.0
 """A value that is older is not the present one."""
 MEAN_S: Final = 0.2
+USUAL_HZ: Final = 60.0
 
 _Key = tuple[tuple[str, ...], float, tuple[object, ...]]
 
@@ -151,7 +151,7 @@ class UDaqPlotter(QWidget):
     @property
     def refresh_hz(self) -> float:
         """How often the image is looked at: the setting, or what the screen can show."""
-        return shown_rate_hz(self._daqco.settings.refresh_hz, self.screen())
+        return _shown_rate_hz(self._daqco.settings.refresh_hz, self.screen())
 
     @property
     def ranges(self) -> dict[str, AxisRange]:
@@ -341,3 +341,9 @@ class UDaqPlotter(QWidget):
     @override
     def sizeHint(self) -> QSize:
         return QSize(110 * STEP_PX, 50 * STEP_PX)
+
+
+def _shown_rate_hz(wanted_hz: float, screen: QScreen | None) -> float:
+    """Return `wanted_hz`, or what the screen can show; some screens do not know and say 0."""
+    most = screen.refreshRate() if screen is not None else USUAL_HZ
+    return min(wanted_hz, most if most > 1.0 else USUAL_HZ)

@@ -27,11 +27,6 @@ class JoinedLibrary(BoardLibrary):
     def name(self) -> str:
         return ", ".join(each.name for each in self._libraries)
 
-    @property
-    def libraries(self) -> tuple[BoardLibrary, ...]:
-        """The libraries that are joined."""
-        return self._libraries
-
     @override
     def list_boards(self) -> tuple[BoardInfo, ...]:
         return tuple(info for info, _ in self._found().values())
@@ -61,8 +56,3 @@ class JoinedLibrary(BoardLibrary):
                     )
                 found[info.name] = info, library
         return found
-
-
-def libraries_in(library: BoardLibrary) -> tuple[BoardLibrary, ...]:
-    """Return the libraries that were joined, or the one that was not."""
-    return library.libraries if isinstance(library, JoinedLibrary) else (library,)

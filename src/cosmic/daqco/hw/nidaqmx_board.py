@@ -11,8 +11,7 @@ from typing_extensions import override
 
 from cosmic.daqco.hw.board_checks import check_chunk, check_inputs, check_rate
 from cosmic.daqco.hw.interface import Board, BoardChunk, BoardInfo, InputSettings
-from cosmic.daqco.hw.nidaqmx_pulses import CounterTask
-from cosmic.daqco.hw.nidaqmx_task import TERMINALS, InputTask, Run, TaskSettings
+from cosmic.daqco.hw.nidaqmx_task import TERMINALS, CounterTask, InputTask, Run, TaskSettings
 from cosmic.daqco.hw.pulses import PulseTrain
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, LimitError

@@ -1,4 +1,4 @@
-"""One NI-DAQmx task: analogue inputs, continuous, with a callback for each chunk."""
+"""Tasks of NI-DAQmx: inputs with a callback for each chunk, and a counter of sample clocks."""
 
 import logging
 import math
@@ -8,11 +8,12 @@ from queue import SimpleQueue
 from typing import Any, Final
 
 import numpy as np
-from nidaqmx.constants import AcquisitionType, TaskMode, TerminalConfiguration, VoltageUnits
+from nidaqmx.constants import AcquisitionType, Level, TaskMode, TerminalConfiguration, VoltageUnits
 from nidaqmx.errors import DaqError, Error
 
 from cosmic.daqco.hw.interface import InputMode, InputSettings, OverrunError, Volts
 from cosmic.daqco.hw.nidaqmx_errors import TABLE, board_error
+from cosmic.daqco.hw.pulses import PulseTrain
 from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout
 
 logger = logging.getLogger(__name__)
@@ -273,3 +274,45 @@ class InputTask:
             return None
         lost = behind - self._settings.buffer_samples if code == OVERWRITTEN else behind
         return lost if lost > 0 else None
+
+
+class CounterTask:
+    """A counter that gives a pulse at every so many samples; start it before the inputs.
+
+    The pulse comes out at the counter's own terminal, PFI 12 for ctr0 and PFI 13 for ctr1 on boards
+    of the M series.
+
+    Raises
+    ------
+    CosmicError
+        The driver refused; nothing is reserved then.
+    """
+
+    def __init__(self, api: Any, train: PulseTrain) -> None:
+        self._board = train.board
+        high = train.every_samples // 2
+        try:
+            self._task = api.Task()
+        except Error as exc:
+            raise board_error(exc, "create a task", train.board) from exc
+        try:
+            self._task.co_channels.add_co_pulse_chan_ticks(
+                f"{train.board}/{train.counter}",
+                f"/{train.board}/ai/SampleClock",
+                idle_state=Level.LOW,
+                initial_delay=train.first_sample,
+                low_ticks=train.every_samples - high,
+                high_ticks=high,
+            )
+            self._task.timing.cfg_implicit_timing(sample_mode=AcquisitionType.CONTINUOUS)
+            self._task.start()
+        except Error as exc:
+            self.close()
+            raise board_error(exc, f"start {train.counter}", train.board) from exc
+
+    def close(self) -> None:
+        """End the pulses and give the counter back; a driver that fails here is logged."""
+        try:
+            self._task.close()
+        except Error as exc:
+            logger.warning("%s: close of a counter: %s", self._board, exc)

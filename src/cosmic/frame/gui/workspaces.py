@@ -18,7 +18,7 @@ USUAL: Final = "usual"
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PanelPlacement:
     """Where a panel stands in a workspace at a first start.
 
     Attributes
@@ -64,7 +64,7 @@ class Workspace:
         Stands on its button.
     tip : str
         What it is for.
-    places : tuple of Place
+    placements : tuple of PanelPlacement
         Its panels; those of a shared place: the first is in front.
     middle : bool
         The middle of the window, with image and scene, is part of it.
@@ -72,7 +72,7 @@ class Workspace:
 
     name: str
     tip: str
-    places: tuple[Place, ...]
+    placements: tuple[PanelPlacement, ...]
     middle: bool = False
 
 
@@ -147,7 +147,7 @@ class Workspaces(QObject):
         """Return the workspace that has a place for a panel: the one shown, if it has."""
         names = [self._current, *self._known] if self._current else list(self._known)
         for name in names:
-            if any(place.title == title for place in self._known[name].places):
+            if any(placement.title == title for placement in self._known[name].placements):
                 return name
         return ""
 
@@ -253,7 +253,7 @@ class Workspaces(QObject):
 
     def _missing(self) -> bool:
         """Tell whether a panel was hidden that has its place here."""
-        docks = (self._docks.get(each.title) for each in self._known[self._current].places)
+        docks = (self._docks.get(each.title) for each in self._known[self._current].placements)
         placed = [dock for dock in docks if dock is not None and self._is_placed(dock)]
         return any(dock.isHidden() for dock in placed)
 
@@ -301,17 +301,17 @@ class Workspaces(QObject):
             dock.setFloating(False)
             window.removeDockWidget(dock)
         fronts: list[QDockWidget] = []
-        for place in workspace.places:
-            if place.title not in docks or not place.shown:
+        for placement in workspace.placements:
+            if placement.title not in docks or not placement.shown:
                 continue
-            dock = docks[place.title]
-            if place.tabbed in docks:
-                window.tabifyDockWidget(docks[place.tabbed], dock)
-            elif place.below in docks:
-                window.splitDockWidget(docks[place.below], dock, Qt.Orientation.Vertical)
+            dock = docks[placement.title]
+            if placement.tabbed in docks:
+                window.tabifyDockWidget(docks[placement.tabbed], dock)
+            elif placement.below in docks:
+                window.splitDockWidget(docks[placement.below], dock, Qt.Orientation.Vertical)
             else:
-                window.addDockWidget(place.area, dock)
-            if not place.tabbed:
+                window.addDockWidget(placement.area, dock)
+            if not placement.tabbed:
                 fronts.append(dock)
             dock.show()
         for dock in fronts:
@@ -319,14 +319,16 @@ class Workspaces(QObject):
         self._size(workspace)
 
     def _size(self, workspace: Workspace) -> None:
-        sized = [each for each in workspace.places if each.share and each.title in self._docks]
+        sized = [each for each in workspace.placements if each.share and each.title in self._docks]
         room = self._window.width()
         self._window.resizeDocks(
             [self._docks[each.title] for each in sized],
             [each.width_px(room) for each in sized],
             Qt.Orientation.Horizontal,
         )
-        high = [each for each in workspace.places if each.height_px and each.title in self._docks]
+        high = [
+            each for each in workspace.placements if each.height_px and each.title in self._docks
+        ]
         self._window.resizeDocks(
             [self._docks[each.title] for each in high],
             [each.height_px for each in high],
@@ -343,13 +345,13 @@ class Workspaces(QObject):
         """Give a panel that no side of the window has its place, or one at the right."""
         if dock.isFloating() or self._is_placed(dock):
             return
-        places = self._known[self._current].places if self._current else ()
-        place = next((each for each in places if each.title == dock.windowTitle()), None)
-        beside = self._docks.get(place.tabbed) if place is not None else None
+        placements = self._known[self._current].placements if self._current else ()
+        placement = next((each for each in placements if each.title == dock.windowTitle()), None)
+        beside = self._docks.get(placement.tabbed) if placement is not None else None
         if beside is not None and self._is_placed(beside):
             self._window.tabifyDockWidget(beside, dock)
         else:
-            area = place.area if place is not None else Area.RightDockWidgetArea
+            area = placement.area if placement is not None else Area.RightDockWidgetArea
             self._window.addDockWidget(area, dock)
 
     def _on_toggled(self, shown: bool) -> None:

@@ -16,14 +16,14 @@ from cosmic.mico.api.plan_movable import PlanMovable
 
 T = TypeVar("T")
 
-Place = Mapping[str, Number] | Sequence[Number]
+AxisValues = Mapping[str, Number] | Sequence[Number]
 """Targets by axis name, with or without the dot, or in the order of the group's axes."""
 
 
 class GroupPosition(dict[str, float | None]):
     """Where the axes of a group are, by name; what is added to it are distances."""
 
-    def __add__(self, distances: Place) -> "GroupPosition":
+    def __add__(self, distances: AxisValues) -> "GroupPosition":
         if isinstance(distances, Mapping):
             by = {plain_name(name): value for name, value in distances.items()}
         else:
@@ -79,7 +79,7 @@ class AxisGroup:
         """Names of the axes, in the order in which a sequence of targets is read."""
         return tuple(self._of)
 
-    def check_value(self, value: Place) -> None:
+    def check_value(self, value: AxisValues) -> None:
         """Raise `MoveRefused` where `set(value)` would fail with it; nothing moves.
 
         Raises
@@ -91,7 +91,7 @@ class AxisGroup:
         if not verdict.allowed:
             raise refusal(verdict)
 
-    def set(self, value: Place) -> MoveStatus:
+    def set(self, value: AxisValues) -> MoveStatus:
         """Start to move to `value` and return a bluesky status; a refusal is how it fails."""
         what = f"{self._name} to {value}"
         try:
@@ -153,7 +153,7 @@ class AxisGroup:
     def _named(self, found: Iterable[Mapping[str, T]]) -> dict[str, T]:
         return {f"{self._prefix}{key}": value for each in found for key, value in each.items()}
 
-    def _targets(self, value: Place) -> dict[str, Number]:
+    def _targets(self, value: AxisValues) -> dict[str, Number]:
         if isinstance(value, Mapping):
             known = {plain_name(name): name for name in self._of}
             unknown = [name for name in value if plain_name(name) not in known]

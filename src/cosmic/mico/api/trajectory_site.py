@@ -1,4 +1,4 @@
-"""What trajectories need where the axes are: players, poses, and a stage for rehearsals."""
+"""What trajectories need where the axes are: players, poses, and rehearsals."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -21,7 +21,7 @@ from cosmic.mico.core.poses import PoseBook, pose_misfits
 from cosmic.mico.core.trajectory.binding import AxisFacts, Bound, PlatformFacts
 from cosmic.mico.core.trajectory.clearance import ClearanceSearch
 from cosmic.mico.core.trajectory.pure_gate import PureAnswers, pure_copy
-from cosmic.mico.core.trajectory.rehearsal import OnProgress, Rehearsal, Stage, rehearse
+from cosmic.mico.core.trajectory.rehearsal import OnProgress, Rehearsal, RehearsalSetup, rehearse
 
 logger = logging.getLogger(__name__)
 
@@ -121,7 +121,7 @@ class TrajectorySite:
         states = self.states()
         with self._rehearsing:
             checker, search = self._pure_gate(bound)
-            stage = Stage(
+            setup = RehearsalSetup(
                 states=states,
                 facts=self.facts(),
                 frequencies_hz={name: float(self.frequency_hz(name)) for name in states},
@@ -134,7 +134,7 @@ class TrajectorySite:
                 progress=progress or (lambda _part, _text: None),
                 cancelled=cancelled or (lambda: False),
             )
-            return rehearse(bound, stage)
+            return rehearse(bound, setup)
 
     def begin_rehearsal(
         self, bound: Bound, *, speed: float = 1.0, timed: bool = True

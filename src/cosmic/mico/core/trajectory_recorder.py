@@ -19,7 +19,7 @@ from cosmic.frame.file_names import check_base_name, check_directory
 from cosmic.frame.threads import WorkerThread
 from cosmic.mico.core.motion.messages import MovementBegun
 from cosmic.mico.core.motion.positioner import PositionerState, positions_of
-from cosmic.mico.core.trajectory.model import Place, Statement, Trajectory
+from cosmic.mico.core.trajectory.model import StartPosition, Statement, Trajectory
 from cosmic.mico.core.trajectory.reader import END_OF_RECORDING
 from cosmic.mico.core.trajectory.segments import SegmentBuilder
 from cosmic.mico.core.trajectory.words import number
@@ -283,10 +283,10 @@ class TrajectoryRecorder(WorkerThread):
             logger.error("%s: %s", self.path, text)
             self._write([f"# {text}"])
 
-    def _take(self, found: Statement | tuple[str, Place]) -> None:
+    def _take(self, found: Statement | tuple[str, StartPosition]) -> None:
         if isinstance(found, tuple):
-            axis, place = found
-            self._write([f"start {axis} {number(place.value)} {place.unit}"])
+            axis, position = found
+            self._write([f"start {axis} {number(position.value)} {position.unit}"])
         else:
             self._write(statement_lines(found))
 

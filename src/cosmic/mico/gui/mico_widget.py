@@ -18,11 +18,10 @@ from cosmic.mico.core.motion.links import Link
 from cosmic.mico.core.settings import GroupSettings, MicoSettings, PositionerSettings
 from cosmic.mico.gui.axis_commands import ConsentRequest
 from cosmic.mico.gui.axis_table import AxisTable
-from cosmic.mico.gui.caution_dialog import CautionDialog
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI
 from cosmic.mico.gui.collision_status import CollisionStatus
 from cosmic.mico.gui.columns import GroupColumns, arranged_groups
-from cosmic.mico.gui.consent_dialog import ConsentDialog
+from cosmic.mico.gui.consent_dialogs import CautionDialog, ConsentDialog
 from cosmic.mico.gui.device_gui import DeviceGUI
 from cosmic.mico.gui.initialisation_panel import make_initialisation_panel
 from cosmic.mico.gui.jog_keys import JogKey, JogKeys

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog, QLabel, QVBoxLayout, QWidget
 
 from cosmic.frame.errors import CosmicError
@@ -17,16 +17,17 @@ from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, ui_font
 from cosmic.frame.operation import Task
 from cosmic.mico.api.mico import Mico
+from cosmic.mico.api.trajectories import Trajectories
 from cosmic.mico.api.trajectory_player import TrajectoryPlayer
+from cosmic.mico.api.trajectory_recording import TrajectoryRecording
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
 from cosmic.mico.core.trajectory.model import SUFFIX, Problem, Trajectory, TrajectoryError
+from cosmic.mico.core.trajectory.parser import LARGEST_BYTES
 from cosmic.mico.core.trajectory.rehearsal import Rehearsal
 from cosmic.mico.gui.poses_box import PosesBox
 from cosmic.mico.gui.trajectory_bars import RecordBar, RunBar, StartQuestion
 from cosmic.mico.gui.trajectory_lines import TrajectoryLines
 from cosmic.mico.gui.trajectory_play import PlayControl
-from cosmic.mico.gui.trajectory_record import RecordControl
-from cosmic.mico.gui.trajectory_texts import lines_of, rehearsal_text
 
 logger = logging.getLogger(__name__)
 
@@ -62,7 +63,7 @@ class TrajectoryPanel(QWidget):
         self._application = mico.application
         self._api = mico.trajectories
         self._make_widgets()
-        self._recorder = RecordControl(mico.trajectories, self.record_bar, self)
+        self._recorder = _RecordControl(mico.trajectories, self.record_bar, self)
         self._play = PlayControl(mico, self.run_bar, self.question, self)
         self._arrange()
         self._connect()
@@ -162,7 +163,7 @@ class TrajectoryPanel(QWidget):
             self._show_trajectory(found)
             return
         self.title.set_text(path.name)
-        self.lines.lines.set_lines(lines_of(path))
+        self.lines.lines.set_lines(_lines_of(path))
         if isinstance(found, TrajectoryError):
             self.lines.lines.set_problems(found.problems)
             self.lines.look_at(found.problems[0].line)
@@ -239,7 +240,7 @@ class TrajectoryPanel(QWidget):
 
     def _show_rehearsal(self, found: Rehearsal) -> None:
         if found.allowed:
-            self._say(rehearsal_text(found), State.OK)
+            self._say(_rehearsal_text(found), State.OK)
             return
         self.lines.lines.set_problems([Problem(found.line, str(found.verdict))])
         self.lines.look_at(found.line)
@@ -259,7 +260,7 @@ class TrajectoryPanel(QWidget):
         words = progress.error or progress.text
         player = self.player
         if progress.state is PlayState.ENDED and player and player.rehearsal is not None:
-            words = f"done. {rehearsal_text(player.rehearsal)}"
+            words = f"done. {_rehearsal_text(player.rehearsal)}"
         self._say(words, _STATES[progress.state])
         self._enable(running=progress.state is PlayState.RUNNING)
 
@@ -282,6 +283,89 @@ class TrajectoryPanel(QWidget):
     def _say(self, text: str, state: State) -> None:
         self.report.setText(text)
         self.badge.set_state(state)
+
+
+class _RecordControl(QObject):
+    """Begins and ends a recording; GUI thread. Nothing here waits.
+
+    Signals
+    -------
+    recorded(Path)
+        A recording was ended, and its file is whole.
+    """
+
+    recorded = Signal(object)
+
+    def __init__(self, api: Trajectories, bar: RecordBar, parent: QObject) -> None:
+        super().__init__(parent)
+        self._api = api
+        self._bar = bar
+        self._recording: TrajectoryRecording | None = None
+        self._relay = Relay(self._on_changed)
+        bar.stop_requested.connect(self.stop)
+
+    def record(self, path: Path) -> None:
+        """Begin to record as the bar says, in place of what is in the file."""
+        bar = self._bar
+        try:
+            self._recording = self._api.record(
+                path,
+                title=path.stem,
+                timed=bar.timed.isChecked(),
+                relative_to=bar.relative_to,
+                sources=bar.sources,
+                overwrite=True,
+            )
+        except CosmicError as exc:
+            bar.show_recording(str(exc), recording=False)
+            return
+        self._recording.subscribe(self._relay)
+        self._on_changed()
+
+    def stop(self) -> None:
+        """End the recording."""
+        recording, self._recording = self._recording, None
+        if recording is None:
+            return
+        recording.stop()
+        self._bar.show_recording(_recording_text(recording), recording=False)
+        if recording.error is None:
+            self.recorded.emit(recording.path)
+
+    def _on_changed(self) -> None:
+        if self._recording is not None:
+            error = self._recording.error
+            self._bar.show_recording(_recording_text(self._recording), recording=error is None)
+
+
+def _rehearsal_text(found: Rehearsal) -> str:
+    """Return what a rehearsal found, for the operator."""
+    parts = [f"{found.lines} lines in about {found.duration_s:.1f} s"]
+    if found.clearance_um is not None:
+        where = f"line {found.clearance_line}" if found.clearance_line else "the start"
+        bodies = " and ".join(found.clearance_bodies)
+        parts.append(f"smallest clearance {found.clearance_um:.0f} µm at {where} ({bodies})")
+    ends = [f"{axis} {value:.1f}" for axis, value in found.end.items()]
+    if ends:
+        parts.append(f"ends at {', '.join(ends)}")
+    return "; ".join(parts)
+
+
+def _recording_text(recording: TrajectoryRecording) -> str:
+    """Return what has become of a recording, for the operator."""
+    if recording.error is not None:
+        return str(recording.error)
+    return f"{recording.path.name}: {recording.lines} lines"
+
+
+def _lines_of(path: Path) -> list[str]:
+    """Return what can be shown of a file that is no trajectory."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(LARGEST_BYTES)
+    except OSError:
+        return []
+    return data.decode("utf-8", errors="replace").splitlines()
 
 
 def make_trajectory_panel(mico: Mico) -> TrajectoryPanel:

@@ -12,7 +12,7 @@ from cosmic.frame.gui.theme import State
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.motion.undo import UndoEntry, undo_text
-from cosmic.mico.gui.caution_dialog import CautionDialog
+from cosmic.mico.gui.consent_dialogs import CautionDialog
 
 UNDO_KEY: Final = "Ctrl+Z"
 

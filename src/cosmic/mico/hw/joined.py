@@ -54,7 +54,7 @@ def _event(received: Event | None) -> Event | None:
 
 
 @dataclass(frozen=True, slots=True)
-class _Place:
+class _JoinedDevice:
     """One device: whose it is, and under which index that one knows it."""
 
     controller: Controller
@@ -75,7 +75,7 @@ class JoinedController(Controller):
 
     def __init__(self, parts: Sequence[Controller]) -> None:
         self._parts = tuple(parts)
-        self._places: tuple[_Place, ...] = ()
+        self._joined: tuple[_JoinedDevice, ...] = ()
 
     @property
     @override
@@ -110,8 +110,8 @@ class JoinedController(Controller):
 
     @override
     def device_capabilities(self, device: int) -> Capabilities:
-        place = self._place(device)
-        return place.controller.device_capabilities(place.index)
+        joined = self._joined_device(device)
+        return joined.controller.device_capabilities(joined.index)
 
     @override
     def find_devices(self) -> tuple[Serial, ...]:
@@ -119,7 +119,7 @@ class JoinedController(Controller):
 
     @override
     def open(self, serials: Sequence[Serial] = ()) -> tuple[DeviceIdentity, ...]:
-        if self._places:
+        if self._joined:
             raise DeviceError(f"{self.name} is open already", fault=DeviceFault.STATE)
         found = [_connected(part) for part in self._parts]
         missing = [each for each in serials if not any(each in one for one in found)]
@@ -129,7 +129,7 @@ class JoinedController(Controller):
                 f"{', '.join(str(each) for one in found for each in one) or 'none'}",
                 fault=DeviceFault.COMMUNICATION,
             )
-        places: list[_Place] = []
+        joined: list[_JoinedDevice] = []
         identities: list[DeviceIdentity] = []
         try:
             for part, there in zip(self._parts, found, strict=True):
@@ -138,22 +138,22 @@ class JoinedController(Controller):
                     logger.warning("%s: none of its devices is connected", part.name)
                     continue
                 for identity in asked(part, partial(part.open, own)):
-                    identities.append(replace(identity, index=len(places)))
-                    places.append(_Place(part, identity.index))
+                    identities.append(replace(identity, index=len(joined)))
+                    joined.append(_JoinedDevice(part, identity.index))
         except DeviceError:
             self._close_parts()
             raise
-        if not places:
+        if not joined:
             raise NotConnectedError(
                 f"{self.name}: no device is connected; check power and cable",
                 fault=DeviceFault.COMMUNICATION,
             )
-        self._places = tuple(places)
+        self._joined = tuple(joined)
         return tuple(identities)
 
     @override
     def close(self) -> None:
-        self._places = ()
+        self._joined = ()
         self._close_parts()
 
     def _close_parts(self) -> None:
@@ -165,19 +165,20 @@ class JoinedController(Controller):
 
     @override
     def receive(self, device: int, timeout_s: float) -> Event | None:
-        place = self._place(device)
+        joined = self._joined_device(device)
         try:
             event = asked(
-                place.controller, lambda: _event(place.controller.receive(place.index, timeout_s))
+                joined.controller,
+                lambda: _event(joined.controller.receive(joined.index, timeout_s)),
             )
         except DeviceError as exc:
-            _readdress(exc, place.index, device)
+            _readdress(exc, joined.index, device)
             raise
         if event is None:
             return None
         channel = event.channel
         if isinstance(event, Failed):
-            _readdress(event.error, place.index, device)
+            _readdress(event.error, joined.index, device)
         return event if channel is None else replace(event, channel=replace(channel, device=device))
 
     @override
@@ -239,9 +240,9 @@ class JoinedController(Controller):
         if len(devices) != 1:
             text = "only channels of one device are started by one command"
             raise DeviceError(text, fault=DeviceFault.PARAMETER)
-        place = self._place(devices.pop())
-        own = [replace(move, channel=replace(move.channel, device=place.index)) for move in moves]
-        asked(place.controller, lambda: place.controller.move_together(own))
+        joined = self._joined_device(devices.pop())
+        own = [replace(move, channel=replace(move.channel, device=joined.index)) for move in moves]
+        asked(joined.controller, lambda: joined.controller.move_together(own))
 
     @override
     def calibrate(self, channel: Channel) -> None:
@@ -269,26 +270,26 @@ class JoinedController(Controller):
 
     def _at(self, channel: Channel, call: Callable[[Controller, Channel], T]) -> T:
         try:
-            place = self._place(channel.device)
+            joined = self._joined_device(channel.device)
         except DeviceError as exc:
             exc.channel = channel.channel
             raise
         try:
-            own = Channel(place.index, channel.channel)
-            return asked(place.controller, lambda: call(place.controller, own))
+            own = Channel(joined.index, channel.channel)
+            return asked(joined.controller, lambda: call(joined.controller, own))
         except DeviceError as exc:
-            _readdress(exc, place.index, channel.device)
+            _readdress(exc, joined.index, channel.device)
             exc.channel = channel.channel
             raise
 
-    def _place(self, device: int) -> _Place:
-        places = self._places
-        if not places:
+    def _joined_device(self, device: int) -> _JoinedDevice:
+        joined = self._joined
+        if not joined:
             raise DeviceError(f"{self.name} is not open", fault=DeviceFault.STATE, device=device)
-        if not 0 <= device < len(places):
+        if not 0 <= device < len(joined):
             text = f"device {device}: there is no such device"
             raise DeviceError(text, fault=DeviceFault.NO_CHANNEL, device=device)
-        return places[device]
+        return joined[device]
 
 
 def _connected(part: Controller) -> tuple[Serial, ...]:

@@ -27,7 +27,7 @@ from cosmic.mico.hw.interface import (
 )
 from cosmic.mico.hw.scu3d_errors import nothing_found, require_serials, status_error
 from cosmic.mico.hw.scu3d_events import event_from_packet
-from cosmic.mico.hw.scu3d_load import load_library
+from cosmic.mico.hw.smaract_load import load_library
 
 logger = logging.getLogger(__name__)
 

@@ -34,7 +34,7 @@ from cosmic.mico.hw.interface import (
     MatchedMove,
     Serial,
 )
-from cosmic.mico.hw.scu3d_load import SmaractLibrary
+from cosmic.mico.hw.smaract_load import SmaractLibrary
 from cosmic.mico.hw.smaractctl_errors import LIBRARY, result_error
 
 SMARACT_CTL: Final = SmaractLibrary(

@@ -13,7 +13,7 @@ from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.recorded.operations import Surroundings
 from cosmic.autonomy.recorded.replay import replay_on
 from cosmic.autonomy.recorded.steps import GripperStep, MoveStep, RecordedProcedure
-from cosmic.autonomy.shipped.fibre_handling import OperationRequest, SingleOperation
+from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
 from cosmic.frame.errors import NotAvailable
 
 WIDTH_UM = 20.0

@@ -18,7 +18,7 @@ from cosmic.autonomy.recorded.steps import (
     WaitForOperatorStep,
     load_recorded,
 )
-from cosmic.autonomy.shipped.fibre_handling import SingleOperation
+from cosmic.autonomy.shipped.single_operation import SingleOperation
 from cosmic.frame.errors import ConfigError
 
 EVERYTHING = RecordedProcedure(

@@ -13,7 +13,7 @@ from cosmic.mico.core.trajectory.binding import AxisFacts, PlatformFacts, bind
 from cosmic.mico.core.trajectory.clearance import ClearanceSearch
 from cosmic.mico.core.trajectory.parser import parse
 from cosmic.mico.core.trajectory.pure_gate import PureAnswers, pure_copy
-from cosmic.mico.core.trajectory.rehearsal import Rehearsal, Stage, rehearse
+from cosmic.mico.core.trajectory.rehearsal import Rehearsal, RehearsalSetup, rehearse
 from cosmic.mico.core.trajectory.timing import LANDING_S, move_s
 from cosmic.mico.hw.interface import Channel, PositionerKind
 from unit.mico.small_scenes import two_arms
@@ -46,7 +46,7 @@ def played(text: str, *, model: bool = True, **options: object) -> Rehearsal:
     )  # fmt: skip
     bound = bind(parse(HEAD + text), facts, dict.fromkeys(now, 0.0))
     live = CollisionManager(MODEL, process=ANSWERS)
-    stage = Stage(
+    setup = RehearsalSetup(
         states=now,
         facts=facts,
         frequencies_hz=dict.fromkeys(now, 5000.0),
@@ -56,7 +56,7 @@ def played(text: str, *, model: bool = True, **options: object) -> Rehearsal:
         clearance=ClearanceSearch(ANSWERS.sweep, bound.trajectory.axes) if model else None,
         **options,  # type: ignore[arg-type]
     )
-    return rehearse(bound, stage)
+    return rehearse(bound, setup)
 
 
 def test_a_line_into_the_other_arm_is_refused_with_its_number() -> None:

@@ -2,7 +2,7 @@
 
 from cosmic.mico.core.motion.messages import MovementBegun
 from cosmic.mico.core.motion.orders import Jog, Motion, MoveTo, Reference, Step
-from cosmic.mico.core.trajectory.model import Place, Statement
+from cosmic.mico.core.trajectory.model import StartPosition, Statement
 from cosmic.mico.core.trajectory.segments import SegmentBuilder
 from cosmic.mico.core.trajectory.writer import statement_lines
 
@@ -22,7 +22,7 @@ class Recording:
             zero=zero or {},
         )
 
-    def _take(self, found: Statement | tuple[str, Place]) -> None:
+    def _take(self, found: Statement | tuple[str, StartPosition]) -> None:
         if isinstance(found, tuple):
             self.lines.append(f"start {found[0]} {found[1].value:g}")
         else:

@@ -1,8 +1,9 @@
-"""What is asked of the collision gate and what it answers, as plain data."""
+"""What is asked of the collision gate and what it answers, as plain data; without Qt."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Final
+from dataclasses import dataclass, field, fields
+from operator import attrgetter
+from typing import Any, Final
 
 from cosmic.mico.core.collision.model import BodyPair
 
@@ -55,6 +56,20 @@ class AxisSpan:
 
 
 Spans = Mapping[str, AxisSpan]
+PackedSpans = Mapping[str, tuple[Any, ...]]
+
+# Tuples are written and read faster than objects.
+_values_of: Final = attrgetter(*(each.name for each in fields(AxisSpan)))
+
+
+def pack_spans(spans: Spans) -> PackedSpans:
+    """Return `spans` as plain tuples."""
+    return {axis: _values_of(span) for axis, span in spans.items()}
+
+
+def unpack_spans(packed: PackedSpans) -> Spans:
+    """Return what `pack_spans` packed."""
+    return {axis: AxisSpan(*values) for axis, values in packed.items()}
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,7 @@ from cosmic.frame.helper_process import (
     HelperProcess,
     HelperRefusalError,
 )
-from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
-from cosmic.mico.core.collision.helper_wire import pack_spans
+from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer, pack_spans
 from cosmic.mico.core.collision.model import BodyPair, SceneModel
 
 logger = logging.getLogger(__name__)

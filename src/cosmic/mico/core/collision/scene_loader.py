@@ -8,13 +8,23 @@ import numpy as np
 
 from cosmic.frame.config import load_model
 from cosmic.frame.errors import ConfigError
-from cosmic.mico.core.collision.model import SceneModel, Shape, ToolFrame
+from cosmic.mico.core.collision.model import (
+    Drive,
+    Joint,
+    JointKind,
+    SceneModel,
+    Shape,
+    ToolFrame,
+)
 from cosmic.mico.core.collision.scene_checks import check_model
-from cosmic.mico.core.collision.scene_drives import make_drives
 from cosmic.mico.core.collision.scene_files import SceneFiles
 from cosmic.mico.core.collision.scene_findings import Findings
 from cosmic.mico.core.collision.scene_pairs import Pairing
-from cosmic.mico.core.collision.scene_settings import SceneSettings, ToolFrameSettings
+from cosmic.mico.core.collision.scene_settings import (
+    DriveSettings,
+    SceneSettings,
+    ToolFrameSettings,
+)
 from cosmic.mico.core.collision.scene_shapes import ShapeMaker
 from cosmic.mico.core.collision.scene_tree import order_joints
 from cosmic.mico.core.collision.scene_urdf import Description, LinkText, turned, understand
@@ -87,7 +97,7 @@ class _Reading:
             joints=joints,
             pieces=pieces,
             views=tuple(view for _, seen in shapes for view in seen),
-            drives=make_drives(settings, self._path, joints, self._findings),
+            drives=_drives(settings, self._path, joints, self._findings),
             pairs=watched,
             allowed=allowed,
             contacts=pairing.contacts(settings, watched, self._path),
@@ -166,3 +176,65 @@ class _Reading:
             self._findings.wrong(where, f"{file.path}: it must hold one link and no joint")
             return None
         return file, described.links[0]
+
+
+def _drives(
+    settings: SceneSettings, path: Path, joints: tuple[Joint, ...], findings: Findings
+) -> tuple[Drive, ...]:
+    """Return the drives; what names no joint, or does not fit its joint, is a mistake."""
+    by_name = {joint.name: joint for joint in joints}
+    taken: dict[str, str] = {}
+    kinds: dict[str, JointKind] = {}
+    drives: list[Drive] = []
+    for number, each in enumerate(settings.drive):
+        where = f"{path}: drive[{number}] ({each.axis})"
+        joint = by_name.get(each.joint)
+        if joint is None or joint.kind is JointKind.FIXED:
+            known = ", ".join(j.name for j in joints if j.kind is not JointKind.FIXED)
+            findings.wrong(where, f"{each.joint!r} is no joint that moves; there are {known}")
+            continue
+        if each.joint in taken:
+            findings.wrong(where, f"joint {each.joint!r} is driven by {taken[each.joint]} already")
+            continue
+        taken[each.joint] = each.axis
+        if kinds.setdefault(each.axis, joint.kind) is not joint.kind:
+            findings.wrong(where, "one axis cannot both slide and turn; give it joints of a kind")
+        if _drive_fits(each, joint, where, findings):
+            drives.append(_drive(each, joint))
+    for joint in joints:
+        if joint.kind is not JointKind.FIXED and joint.name not in taken:
+            findings.odd(path, f"joint {joint.name!r} has no [[drive]]; it stays at 0")
+    return tuple(drives)
+
+
+def _drive_fits(each: DriveSettings, joint: Joint, where: str, findings: Findings) -> bool:
+    turns = joint.kind is JointKind.REVOLUTE
+    foreign = "um" if turns else "deg"
+    named = [
+        name
+        for name in (f"offset_{foreign}", f"overshoot_{foreign}", f"uncertainty_{foreign}")
+        if getattr(each, name) is not None
+    ]
+    for name in named:
+        kind = "turns: write _deg" if turns else "slides: write _um"
+        findings.wrong(where, f"{name}: joint {joint.name!r} {kind}")
+    if each.factor == 0.0:
+        findings.wrong(where, "factor: 0 would move nothing; 1, -1 or the ratio of a gear")
+    return not named and each.factor != 0.0
+
+
+def _drive(each: DriveSettings, joint: Joint) -> Drive:
+    if joint.kind is JointKind.REVOLUTE:
+        ratio, offset = math.radians(each.factor), math.radians(each.offset_deg or 0.0)
+        overshoot, uncertainty = each.overshoot_deg, each.uncertainty_deg
+    else:
+        ratio, offset = each.factor, each.offset_um or 0.0
+        overshoot, uncertainty = each.overshoot_um, each.uncertainty_um
+    return Drive(
+        each.axis,
+        each.joint,
+        ratio,
+        offset,
+        overshoot or 0.0,
+        math.inf if uncertainty is None else uncertainty,
+    )

@@ -1,10 +1,6 @@
 """What the channels of one device share: the library, the gate, and how they report."""
 
-from abc import abstractmethod
 from dataclasses import dataclass, replace
-from typing import Protocol
-
-from PySide6.QtCore import SignalInstance
 
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError, refusal
@@ -14,6 +10,7 @@ from cosmic.mico.core.motion.data_container import DeviceDataContainer
 from cosmic.mico.core.motion.gate import Gate
 from cosmic.mico.core.motion.gate_queue import GateQueue
 from cosmic.mico.core.motion.messages import (
+    DeviceSignals,
     Message,
     MovementBegun,
     MovementEnded,
@@ -23,35 +20,6 @@ from cosmic.mico.core.motion.messages import (
 from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Controller
-
-
-class DeviceSignals(Protocol):
-    """The signals of a `Device`."""
-
-    @property
-    @abstractmethod
-    def position_changed(self) -> SignalInstance:
-        """A position was read that differs from the one before."""
-
-    @property
-    @abstractmethod
-    def state_changed(self) -> SignalInstance:
-        """The state of a positioner changed."""
-
-    @property
-    @abstractmethod
-    def movement_begun(self) -> SignalInstance:
-        """A movement was sent to the controller."""
-
-    @property
-    @abstractmethod
-    def movement_ended(self) -> SignalInstance:
-        """A movement ended."""
-
-    @property
-    @abstractmethod
-    def movement_refused(self) -> SignalInstance:
-        """The gate refused a movement."""
 
 
 class AxisReports:

@@ -1,13 +1,20 @@
-"""`DeviceDataContainer`: the thread-safe state of one device's positioners (thesis 6.1.1)."""
+"""What is known of one device: `DeviceDataContainer` keeps it, `DeviceListener` receives it.
+
+Thesis 5.4 and 6.1.1.
+"""
 
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from threading import Condition
+from threading import RLock
 from typing import Final
 
+from typing_extensions import override
+
 from cosmic.frame.clock import WALL
-from cosmic.frame.errors import ConfigError, DeviceFault, NotAvailable
+from cosmic.frame.errors import ConfigError, DeviceError, DeviceFault, NotAvailable
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.threads import WorkerThread
 from cosmic.mico.core.motion.orders import COMMON
 from cosmic.mico.core.motion.positioner import (
     Confidence,
@@ -23,6 +30,7 @@ from cosmic.mico.hw.interface import (
     ActivityRead,
     Capabilities,
     Channel,
+    Controller,
     Event,
     Failed,
     PositionerKind,
@@ -40,6 +48,8 @@ logger = logging.getLogger(__name__)
 Observer = Callable[[Event, PositionerState | None], None]
 
 NO_DEVICE: Final = "no device"
+RECEIVE_S: Final = 0.1
+"""How long one receive waits: no call can cancel it, so it bounds how long closing takes."""
 _LOST_POSITION: Final = (DeviceFault.NO_SENSOR,)
 
 
@@ -87,7 +97,7 @@ class DeviceDataContainer:
         self.library_index = library_index
         self._configured = dict(configured)
         self._hold_s = hold_s
-        self._changed = Condition()
+        self._lock = RLock()
         self._positioners: dict[int, PositionerBase] = {}
         self._unclear: set[int] = set()
         self._observers: tuple[Observer, ...] = ()
@@ -115,19 +125,13 @@ class DeviceDataContainer:
 
     def expect(self, channel: int) -> None:
         """Say that an answer about `channel` is awaited."""
-        with self._changed:
+        with self._lock:
             self._unclear.add(channel)
 
     def settle(self, channel: int, kind: PositionerKind | None, reason: str = "") -> None:
         """Say what `channel` has: a kind, or nothing (None)."""
-        with self._changed:
+        with self._lock:
             self._settle(channel, kind, None, reason)
-            self._changed.notify_all()
-
-    def wait_until_clear(self, timeout_s: float) -> bool:
-        """Wait until every expected channel has answered; False after `timeout_s` of wall time."""
-        with self._changed:
-            return self._changed.wait_for(lambda: not self._unclear, timeout_s)
 
     @property
     def clear(self) -> bool:
@@ -214,7 +218,7 @@ class DeviceDataContainer:
 
     def update(self, channel: int, **changes: object) -> PositionerState | None:
         """Change fields of one positioner's state and return it."""
-        with self._changed:
+        with self._lock:
             positioner = self._positioners.get(channel)
             return positioner.update(**changes) if positioner else None
 
@@ -222,7 +226,7 @@ class DeviceDataContainer:
         self, channel: int, travel: CountedTravel | None, position: float, std: float
     ) -> None:
         """Say where an axis without sensor stands; raises as `check_estimate`."""
-        with self._changed:
+        with self._lock:
             positioner = self._positioners.get(channel)
             if positioner is None:
                 raise NotAvailable(f"device {self.device} channel {channel} has no axis")
@@ -231,7 +235,7 @@ class DeviceDataContainer:
 
     def lose(self, reason: str) -> list[PositionerState]:
         """Say that the whole device is gone; positions are worth nothing from now on."""
-        with self._changed:
+        with self._lock:
             return [
                 each.update(
                     present=False,
@@ -244,9 +248,8 @@ class DeviceDataContainer:
 
     def apply(self, event: Event) -> None:
         """Take in one event of the controller; listener thread."""
-        with self._changed:
+        with self._lock:
             state = self._apply(event)
-            self._changed.notify_all()
         for observer in self._observers:
             observer(event, state)
 
@@ -266,6 +269,49 @@ class DeviceDataContainer:
     def address(self, channel: int) -> Channel:
         """Return the address of `channel` for calls to the controller."""
         return Channel(self.library_index, channel)
+
+
+class DeviceListener(WorkerThread):
+    """Waits for the packets of one device and hands them to its `DeviceDataContainer`.
+
+    Parameters
+    ----------
+    on_lost : callable
+        Told why when the device cannot be reached any more; called in this thread.
+    """
+
+    may_wait = False
+
+    def __init__(
+        self,
+        controller: Controller,
+        container: DeviceDataContainer,
+        policy: FailurePolicy,
+        on_lost: Callable[[DeviceError], None],
+    ) -> None:
+        super().__init__(f"listener {container.device}", policy)
+        self._controller = controller
+        self._container = container
+        self._on_lost = on_lost
+
+    @override
+    def run_body(self) -> None:
+        try:
+            self._listen()
+        except BaseException as exc:
+            self._on_lost(DeviceError(f"its listener failed: {exc!r}"))
+            raise
+
+    def _listen(self) -> None:
+        while not self.end_requested:
+            try:
+                event = self._controller.receive(self._container.library_index, RECEIVE_S)
+            except DeviceError as exc:
+                self._on_lost(exc)
+                return
+            if event is not None:
+                logger.debug("%s", event)
+                self._container.apply(event)
 
 
 def _with_driver(

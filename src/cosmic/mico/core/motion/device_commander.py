@@ -4,11 +4,11 @@ from abc import abstractmethod
 from enum import Flag, auto
 from typing import Protocol
 
-from PySide6.QtCore import QMetaObject, QObject, Qt, Signal, SignalInstance
+from PySide6.QtCore import QMetaObject, QObject, Qt, Signal
 
 from cosmic.frame.errors import NotConnectedError
 from cosmic.frame.units import AxisUnit
-from cosmic.mico.core.motion.messages import Order
+from cosmic.mico.core.motion.messages import DeviceSignals, Order
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import (
     Calibrate,
@@ -35,28 +35,8 @@ class CommanderType(Flag):
     INPUT_OUTPUT = INPUT | OUTPUT
 
 
-class Commanded(Protocol):
+class Commanded(DeviceSignals, Protocol):
     """What a commander is joined to: a `Device`."""
-
-    @property
-    @abstractmethod
-    def position_changed(self) -> SignalInstance:
-        """See `Device`, as the other signals."""
-
-    @property
-    @abstractmethod
-    def state_changed(self) -> SignalInstance:
-        """The state of a positioner changed."""
-
-    @property
-    @abstractmethod
-    def movement_ended(self) -> SignalInstance:
-        """A movement ended."""
-
-    @property
-    @abstractmethod
-    def movement_refused(self) -> SignalInstance:
-        """The gate refused a movement."""
 
     @abstractmethod
     def submit(self, order: Order) -> None:

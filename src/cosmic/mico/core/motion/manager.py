@@ -26,10 +26,14 @@ from cosmic.mico.core.collision.exemptions import Exemptions
 from cosmic.mico.core.collision.model import BodyPair
 from cosmic.mico.core.mode import Mode
 from cosmic.mico.core.motion.checks import Limits
-from cosmic.mico.core.motion.data_container import NO_DEVICE, DeviceDataContainer, Memory
+from cosmic.mico.core.motion.data_container import (
+    NO_DEVICE,
+    DeviceDataContainer,
+    DeviceListener,
+    Memory,
+)
 from cosmic.mico.core.motion.device import Device
 from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander
-from cosmic.mico.core.motion.device_listener import DeviceListener
 from cosmic.mico.core.motion.gate import Gate
 from cosmic.mico.core.motion.group import GroupOrders
 from cosmic.mico.core.motion.lease import Lease

@@ -1,9 +1,12 @@
 """What goes into a `Device`'s queue, and what comes out of its signals."""
 
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
-from typing import Final, NamedTuple, Self
+from typing import Final, NamedTuple, Protocol, Self
+
+from PySide6.QtCore import SignalInstance
 
 from cosmic.frame.errors import CosmicError, DeviceError
 from cosmic.frame.operation import Task
@@ -274,3 +277,32 @@ Message = (
     | Wake
 )
 """What a `Device` takes from its queue."""
+
+
+class DeviceSignals(Protocol):
+    """The signals of a `Device`."""
+
+    @property
+    @abstractmethod
+    def position_changed(self) -> SignalInstance:
+        """A position was read that differs from the one before."""
+
+    @property
+    @abstractmethod
+    def state_changed(self) -> SignalInstance:
+        """The state of a positioner changed."""
+
+    @property
+    @abstractmethod
+    def movement_begun(self) -> SignalInstance:
+        """A movement was sent to the controller."""
+
+    @property
+    @abstractmethod
+    def movement_ended(self) -> SignalInstance:
+        """A movement ended."""
+
+    @property
+    @abstractmethod
+    def movement_refused(self) -> SignalInstance:
+        """The gate refused a movement."""

@@ -202,16 +202,16 @@ class _Binder:
                 self._zero[axis] = pose.positions[axis]
 
     def _take_start(self) -> None:
-        for axis, place in self._trajectory.start.items():
-            facts = self._known(axis, place.line)
+        for axis, position in self._trajectory.start.items():
+            facts = self._known(axis, position.line)
             if facts is None or not facts.has_sensor:
                 continue
-            if place.unit != facts.unit:
+            if position.unit != facts.unit:
                 self._add_problem(
-                    place.line, f"{axis} is counted in {facts.unit}, not in {place.unit}"
+                    position.line, f"{axis} is counted in {facts.unit}, not in {position.unit}"
                 )
                 continue
-            self._reach(axis, place.value + self._zero.get(axis, 0.0), facts, place.line)
+            self._reach(axis, position.value + self._zero.get(axis, 0.0), facts, position.line)
 
     def _known(self, axis: str, line: int) -> AxisFacts | None:
         facts = self._facts.axes.get(axis)

@@ -6,9 +6,9 @@ from dataclasses import replace
 from cosmic.mico.core.trajectory.model import (
     Leg,
     Move,
-    Place,
     Problem,
     Speed,
+    StartPosition,
     Statement,
     Steps,
     Trajectory,
@@ -29,8 +29,8 @@ def mirrored(trajectory: Trajectory, settings: MirrorSettings) -> Trajectory:
     mirror = _Mirror(settings.partners(), settings.reversed)
     statements = tuple(mirror.statement(each) for each in trajectory.statements)
     start = {
-        mirror.axis(axis, place.line): mirror.place(axis, place)
-        for axis, place in trajectory.start.items()
+        mirror.axis(axis, position.line): mirror.start_position(axis, position)
+        for axis, position in trajectory.start.items()
     }
     pose_axes = trajectory.pose_axes
     if pose_axes is not None:
@@ -67,8 +67,8 @@ class _Mirror:
     def _sign(self, axis: str) -> float:
         return -1.0 if axis in self._turned else 1.0
 
-    def place(self, axis: str, place: Place) -> Place:
-        return replace(place, value=self._sign(axis) * place.value)
+    def start_position(self, axis: str, position: StartPosition) -> StartPosition:
+        return replace(position, value=self._sign(axis) * position.value)
 
     def statement(self, statement: Statement) -> Statement:
         """Return the counterpart of a statement."""

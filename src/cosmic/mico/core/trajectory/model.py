@@ -119,7 +119,7 @@ Statement = Leg | Wait | Speed
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class StartPosition:
     """Where an axis stood when a recording began."""
 
     value: float
@@ -139,7 +139,7 @@ class Trajectory:
         Named pose that positions are relative to; empty when they are not.
     pose_axes : tuple of str or None
         Which axes are; None: all.
-    start : mapping of Place
+    start : mapping of StartPosition
         Where axes stood when it was recorded.
     recorded : str
         When it was recorded; empty when it was written by hand.
@@ -157,7 +157,7 @@ class Trajectory:
     pose_axes: tuple[str, ...] | None = None
     pose_line: int = 0
     platform_line: int = 0
-    start: Mapping[str, Place] = field(default_factory=dict)
+    start: Mapping[str, StartPosition] = field(default_factory=dict)
     comments: tuple[tuple[int, str], ...] = ()
     lines: tuple[str, ...] = ()
     path: Path | None = None

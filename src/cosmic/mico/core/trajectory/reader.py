@@ -11,9 +11,9 @@ from cosmic.mico.core.trajectory.model import (
     VERSION,
     Leg,
     Move,
-    Place,
     Problem,
     Speed,
+    StartPosition,
     Statement,
     Steps,
     Trajectory,
@@ -38,7 +38,7 @@ class TrajectoryReader:
         self.problems: list[Problem] = []
         self._statements: list[Statement] = []
         self._comments: list[tuple[int, str]] = []
-        self._start: dict[str, Place] = {}
+        self._start: dict[str, StartPosition] = {}
         self._once: dict[str, tuple[str, int]] = {}
         self._pose_axes: tuple[str, ...] | None = None
         self._moved: set[str] = set()
@@ -206,7 +206,7 @@ class TrajectoryReader:
             if axis in self._start:
                 raise QuantityError(f"the start of {axis} is in line {self._start[axis].line}")
             value, unit = words.position(where.strip())
-            self._start[axis] = Place(value, unit, self._line)
+            self._start[axis] = StartPosition(value, unit, self._line)
 
     def _speed(self, rest: str) -> None:
         name, _, how = rest.partition(" ")

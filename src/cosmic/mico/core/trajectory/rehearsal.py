@@ -72,7 +72,7 @@ class Rehearsal:
 
 
 @dataclass(frozen=True)
-class Stage:
+class RehearsalSetup:
     """What a rehearsal is played on.
 
     Attributes
@@ -98,23 +98,23 @@ class Stage:
     cancelled: Callable[[], bool] = field(default=lambda: False)
 
 
-def rehearse(bound: Bound, stage: Stage) -> Rehearsal:
+def rehearse(bound: Bound, setup: RehearsalSetup) -> Rehearsal:
     """Return what `bound` would do; it begins where its start says, or else where axes stand.
 
     Raises
     ------
     MoveCancelled
-        `stage.cancelled` said so.
+        `setup.cancelled` said so.
     """
-    return _Play(bound, stage).run()
+    return _Play(bound, setup).run()
 
 
 class _Play:
     """One rehearsal under way."""
 
-    def __init__(self, bound: Bound, stage: Stage) -> None:
+    def __init__(self, bound: Bound, setup: RehearsalSetup) -> None:
         self._bound = bound
-        self._stage = stage
+        self._setup = setup
         now_s = WALL.now_s()
         self._began_s = now_s
         self._states = {
@@ -125,9 +125,9 @@ class _Play:
                 in_motion=False,
                 activity=Activity.STOPPED,
             )
-            for name, state in stage.states.items()
+            for name, state in setup.states.items()
         }
-        self._hertz = dict(stage.frequencies_hz)
+        self._hertz = dict(setup.frequencies_hz)
         self._time_s = 0.0
         self._lines = 0
         self._began: list[tuple[int, float]] = []
@@ -135,14 +135,14 @@ class _Play:
 
     def run(self) -> Rehearsal:
         """Go through all lines, up to the first that is refused."""
-        search = self._stage.clearance
+        search = self._setup.clearance
         if search is not None:
             search.begin(self._poses[0])
         steps = self._bound.steps
         for number, step in enumerate(steps):
             if number % _LOOK_EVERY == 0:
-                self._stage.progress(number / len(steps), f"line {step.line}")
-                if self._stage.cancelled():
+                self._setup.progress(number / len(steps), f"line {step.line}")
+                if self._setup.cancelled():
                     raise MoveCancelled("the rehearsal was cancelled")
             match step:
                 case Wait():
@@ -150,7 +150,7 @@ class _Play:
                     self._began.append((step.line, self._time_s))
                     self._time_s += step.duration_s
                 case BoundSpeed():
-                    usual = self._stage.frequencies_hz.get(step.axis, 0.0)
+                    usual = self._setup.frequencies_hz.get(step.axis, 0.0)
                     self._hertz[step.axis] = step.frequency_hz or usual
                 case BoundLeg():
                     verdict = self._leg(step)
@@ -160,21 +160,21 @@ class _Play:
         return self._result(0, ALLOWED)
 
     def _wait_for(self, at_s: float | None) -> None:
-        if at_s is not None and self._stage.timed:
-            self._time_s = max(self._time_s, at_s / self._stage.speed)
+        if at_s is not None and self._setup.timed:
+            self._time_s = max(self._time_s, at_s / self._setup.speed)
 
     def _leg(self, leg: BoundLeg) -> MoveVerdict:
         requests = [Request(axis, motion, _TOKEN) for axis, motion in leg.motions.items()]
-        picture = PlatformSnapshot(
+        snapshot = PlatformSnapshot(
             stop_reason=None,
             token=_TOKEN,
             states=self._states,
             held={},
             targets={},
             now_wall_s=self._began_s,
-            rules=self._stage.rules,
+            rules=self._setup.rules,
         )
-        verdict = check_move(requests, picture, self._stage.checker).verdict
+        verdict = check_move(requests, snapshot, self._setup.checker).verdict
         if not verdict.allowed:
             return verdict
         self._wait_for(leg.at_s)
@@ -188,10 +188,10 @@ class _Play:
         targets = {axis: self._target(axis, motion) for axis, motion in leg.motions.items()}
         distances = {axis: target - before.get(axis, target) for axis, target in targets.items()}
         hertz = {
-            axis: scaled_hz(value, self._stage.speed, self._states[axis].frequency_range_hz)
+            axis: scaled_hz(value, self._setup.speed, self._states[axis].frequency_range_hz)
             for axis, value in self._hertz.items()
         }
-        facts = self._stage.facts
+        facts = self._setup.facts
         times_s = leg_times_s(leg.motions, distances, hertz, facts.axes, facts.defaults)
         for axis, target in targets.items():
             self._states[axis] = replace(self._states[axis], position=target)
@@ -207,7 +207,7 @@ class _Play:
         line: int,
     ) -> None:
         """Follow the line, which has a bend wherever one of several axes arrives."""
-        search = self._stage.clearance
+        search = self._setup.clearance
         if search is None:
             return
         at = before
@@ -229,7 +229,7 @@ class _Play:
             case MoveBy():
                 return here + motion.distance
             case Step():
-                step_um = self._stage.step_um.get(axis, 1.0)
+                step_um = self._setup.step_um.get(axis, 1.0)
                 return here + motion.steps * motion.amplitude_v / 100.0 * step_um
             case _:
                 return here
@@ -242,7 +242,7 @@ class _Play:
         }
 
     def _result(self, line: int, verdict: MoveVerdict) -> Rehearsal:
-        search = self._stage.clearance
+        search = self._setup.clearance
         best = search.best if search is not None else None
         axes = self._bound.trajectory.axes
         end = self._poses[-1]

@@ -7,7 +7,7 @@ from typing import Final
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.core.motion.messages import MovementBegun
 from cosmic.mico.core.motion.orders import MOTION_WORDS, Jog, MoveBy, MoveTo, Step
-from cosmic.mico.core.trajectory.model import Leg, Move, Place, Speed, Statement, Steps
+from cosmic.mico.core.trajectory.model import Leg, Move, Speed, StartPosition, Statement, Steps
 
 STILL: Final[dict[str, float]] = {"um": 0.5, "deg": 0.0005}
 """What a position may differ by without the axis having moved."""
@@ -73,7 +73,7 @@ class SegmentBuilder:
 
     def __init__(
         self,
-        emit: Callable[[Statement | tuple[str, Place]], None],
+        emit: Callable[[Statement | tuple[str, StartPosition]], None],
         comment: Callable[[str], None],
         *,
         begin_s: float,
@@ -171,7 +171,7 @@ class SegmentBuilder:
         if sensed and event.name not in self._started:
             self._started.add(event.name)
             value = start - self._zero.get(event.name, 0.0)
-            self._emit((event.name, Place(value, event.unit, 0)))
+            self._emit((event.name, StartPosition(value, event.unit, 0)))
 
     def _goes_on(self, part: _Part, event: MovementBegun, positions: Positions) -> bool:
         """Return True when a movement only takes the place of one the same way."""

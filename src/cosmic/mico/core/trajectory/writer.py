@@ -42,8 +42,8 @@ def head_lines(trajectory: Trajectory) -> list[str]:
         axes = "" if trajectory.pose_axes is None else f": {', '.join(trajectory.pose_axes)}"
         lines.append(f"relative to pose {trajectory.pose}{axes}")
     lines += [
-        f"start {axis} {number(place.value)} {place.unit}"
-        for axis, place in trajectory.start.items()
+        f"start {axis} {number(position.value)} {position.unit}"
+        for axis, position in trajectory.start.items()
     ]
     return [*lines, ""]
 

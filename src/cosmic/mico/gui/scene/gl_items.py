@@ -85,7 +85,7 @@ _GLASS: Final = _SOLID | {GL.GL_BLEND: True, "glBlendFuncSeparate": _BLENDED}
 """Back faces are left out of glass too: one layer a body says enough."""
 
 
-class Stage:
+class ItemsView:
     """Stands where pyqtgraph's items expect their GLViewWidget: tells them the camera."""
 
     def __init__(self) -> None:
@@ -137,9 +137,9 @@ class BodyItem:
     Its context must be current when it is made.
     """
 
-    def __init__(self, mesh: BodyMesh, stage: Stage) -> None:
+    def __init__(self, mesh: BodyMesh, items_view: ItemsView) -> None:
         self.body = mesh.body
-        self._stage = stage
+        self._items_view = items_view
         low, high = mesh.bounds_mm
         self.middle_mm = (low + high) / 2.0
         self._solid = self._item(mesh, ~mesh.glass)
@@ -151,7 +151,7 @@ class BodyItem:
         item = gl.GLMeshItem()
         # Handed over ready: pyqtgraph's own normals are made in a loop, and are soft at edges.
         item.vertexes, item.normals, item.colors, item.faces = indexed(mesh, which)
-        item._setView(self._stage)  # noqa: SLF001 - pyqtgraph has no other way to give a camera
+        item._setView(self._items_view)  # noqa: SLF001 - pyqtgraph has no other way to give a camera
         item.upload_vertex_buffers(_ALL)
         return item
 
@@ -171,8 +171,8 @@ class BodyItem:
     def _draw(self, item: Any, camera_from_body: Floats, look: Look, how: Any) -> None:
         if item is None:
             return
-        self._stage.camera_from_item = matrix(camera_from_body)
-        shader = self._stage.shader(stripes=look.stripes)
+        self._items_view.camera_from_item = matrix(camera_from_body)
+        shader = self._items_view.shader(stripes=look.stripes)
         set_look(shader, look.tint, look.share, look.opacity)
         item.setShader(shader)
         item.setGLOptions(how)

@@ -21,7 +21,7 @@ from cosmic.mico.gui.scene.annotations import (
 from cosmic.mico.gui.scene.camera import Camera, Sight
 from cosmic.mico.gui.scene.content import SceneContent
 from cosmic.mico.gui.scene.gl_context import GLContext
-from cosmic.mico.gui.scene.gl_items import BodyItem, Look, Stage, matrix
+from cosmic.mico.gui.scene.gl_items import BodyItem, ItemsView, Look, matrix
 from cosmic.mico.gui.scene.picking import Ray, pick
 from cosmic.mico.gui.scene.view import SceneView
 
@@ -45,7 +45,7 @@ class GLSceneView(SceneView):
     ) -> None:
         super().__init__(content, parent)
         self._context = context
-        self._stage = Stage()
+        self._items_view = ItemsView()
         self._items: dict[str, BodyItem] = {}
         self._camera = Camera()
         self._image: QImage | None = None
@@ -109,11 +109,11 @@ class GLSceneView(SceneView):
     def _draw_scene(self) -> None:
         if not self._items:
             self._items = {
-                body: BodyItem(mesh, self._stage) for body, mesh in self.content.meshes.items()
+                body: BodyItem(mesh, self._items_view) for body, mesh in self.content.meshes.items()
             }
         GL.glClearColor(*_rgb(self.theme().window), 1.0)
         GL.glClear(GL.GL_COLOR_BUFFER_BIT | GL.GL_DEPTH_BUFFER_BIT)
-        self._stage.projection = matrix(self._camera.projection(self.width(), self.height()))
+        self._items_view.projection = matrix(self._camera.projection(self.width(), self.height()))
         self._draw_solid(self._camera.view())
         GL.glDepthMask(GL.GL_FALSE)
         self._draw_glass(self._camera.view())

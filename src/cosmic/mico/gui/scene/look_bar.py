@@ -33,11 +33,6 @@ class BodiesButton(QToolButton):
         self._say()
 
     @property
-    def actions_by_body(self) -> dict[str, QAction]:
-        """The entries of the list."""
-        return dict(self._actions)
-
-    @property
     def hidden(self) -> frozenset[str]:
         """The bodies that are not to be shown, those of other models included."""
         return self._hidden

@@ -1,4 +1,4 @@
-"""Room on the disk, taken before HDF5 needs it.
+"""Preallocation: space on the disk is taken before HDF5 needs it.
 
 HDF5 does not survive a disk that fills while it writes its own tables: it was seen to end the
 process with a segmentation fault. So the file is made longer ahead of it, by a call that fails in
@@ -20,17 +20,17 @@ logger = logging.getLogger(__name__)
 
 STEP_BYTES: Final = 16 * 1024 * 1024
 TABLES_BYTES: Final = 4 * 1024 * 1024
-# Said by file systems that cannot take room in advance; there the check of the free room remains.
+# Said by file systems that cannot preallocate; there the check of the free space remains.
 NOT_SUPPORTED: Final = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP)
 
 
-class Room:
+class Preallocation:
     """Keeps a file longer than what is in it; one thread.
 
     Parameters
     ----------
     margin_bytes : int
-        What may still be written after no more room was to be had.
+        What may still be written after no more space was to be had.
     """
 
     def __init__(self, file: h5py.File, path: Path, margin_bytes: int) -> None:
@@ -41,11 +41,11 @@ class Room:
 
     @property
     def used_bytes(self) -> int:
-        """How long the file is without the room ahead."""
+        """How long the file is without the space ahead."""
         return int(self._file.id.get_filesize())
 
     def need(self) -> None:
-        """See to it that there is a margin; raises `OSError` where there is no room for it."""
+        """See to it that there is a margin; raises `OSError` where the disk is full."""
         used = self.used_bytes
         if used + self._margin_bytes <= self._taken_bytes:
             return
@@ -61,11 +61,11 @@ class Room:
         if hasattr(os, "posix_fallocate"):
             at = self._taken_bytes
             os.posix_fallocate(self._file.id.get_vfd_handle(), at, length - at)
-        else:  # Windows and macOS; NTFS takes the room as well
+        else:  # Windows and macOS; NTFS takes the space as well
             os.truncate(self._path, length)
 
 
-def cut(path: Path) -> None:
+def trim(path: Path) -> None:
     """Cut a closed file to the length that it says it has."""
     try:
         with path.open("r+b") as file:

@@ -21,7 +21,7 @@ _CARD_ABOVE_PX: Final = 4 * STEP_PX
 """Room below the card, in which the image says where the mouse is."""
 
 
-class Stage(QWidget):
+class CentralView(QWidget):
     """Shows a camera large and the scene as inset, or the other way round; GUI thread.
 
     Only places change: no picture is made anew, so a swap is seen at once.
@@ -76,11 +76,6 @@ class Stage(QWidget):
     def camera(self) -> CameraView:
         """The camera that is shown, large or as inset."""
         return self._cameras[self._camera]
-
-    @property
-    def inset_shown(self) -> bool:
-        """Whether the other picture is shown as inset."""
-        return self._inset_wanted
 
     def set_bar(self, bar: QWidget) -> None:
         """Have `bar` along the lower edge: below the image where there is room, else on it."""

@@ -12,7 +12,7 @@ import pytest
 
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
 from cosmic.mico.hw import scu3d_ctypes as sa
-from cosmic.mico.hw import scu3d_load as load
+from cosmic.mico.hw import smaract_load as load
 from cosmic.mico.hw.interface import Channel, PositionRead
 from cosmic.mico.hw.scu3d import Scu3dController
 

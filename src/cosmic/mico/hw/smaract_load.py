@@ -78,11 +78,6 @@ SCU3D_CONTROL: Final = SmaractLibrary(
 )
 
 
-def default_library_name() -> str:
-    """Return the file name under which SmarAct ships the library for this system."""
-    return SCU3D_CONTROL.name
-
-
 def load_library(path: str = "") -> ctypes.CDLL:
     """Load SCU3DControl; see `SmaractLibrary.load`."""
     return SCU3D_CONTROL.load(path)
