@@ -6,6 +6,7 @@ from benchmarks.certainty import cases, drawn_cases, split, wrong
 from benchmarks.fibre_pairs import TOLD_APART, Kind, draw
 
 from cosmic.vico.api import find_fibres
+from cosmic.vico.core.vision import checks
 from cosmic.vico.core.vision.axial import NAMES, Joints
 from cosmic.vico.core.vision.certainty import CERTAIN, Signs, probability
 from unit.vico.vision.drawn_fibres import arc, drawn_image, strip
@@ -51,6 +52,19 @@ def test_a_fibre_that_goes_on_thinner_is_not_certain() -> None:
     assert sum(wrong(each) for each in drawn) == 0
 
 
+@pytest.mark.parametrize("seed", [100_020, 100_064, 100_280, 100_295])
+def test_what_is_uneven_all_along_has_no_dirt_at_its_ends(seed: int) -> None:
+    (found,) = drawn_cases(draw(Kind.SINGLE, seed, jpeg=False, large=seed % 7 < 2))
+    assert found.right
+    assert checks.IMPRECISE not in found.fibre.doubts
+
+
+@pytest.mark.parametrize(("seed", "jpeg"), [(640_200, True), (640_272, True), (620_818, False)])
+def test_a_joint_that_compression_or_roughness_hides_is_not_certain(seed: int, jpeg: bool) -> None:
+    one = draw(PAIRS[seed % 3], seed, jpeg=jpeg, large=seed % 7 < 2)
+    assert wrong(drawn_cases(one)) == 0
+
+
 def test_what_goes_on_faintly_beyond_an_end_is_seen() -> None:
     line = arc((60.0, 200.0), 0.0, 250.0, 0.0)
     image = drawn_image([line], [12.0], noise=2.0).astype(np.float32)
@@ -72,8 +86,8 @@ def test_a_sign_that_becomes_clearer_lowers_the_probability() -> None:
 
 
 def test_weak_signs_count_together_where_they_lie_in_one_place() -> None:
-    scattered = np.diag(np.full(len(NAMES), 1.5))
+    scattered = np.diag(np.full(len(NAMES), 0.9))
     together = np.zeros_like(scattered)
-    together[:, 3] = 1.5
+    together[:, 3] = 0.9
     uneven, joint = (Signs(Joints(along=along)) for along in (scattered, together))
     assert probability(uneven, []) >= CERTAIN > probability(joint, [])

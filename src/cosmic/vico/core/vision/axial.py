@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import (
     binary_erosion,
+    correlate1d,
     gaussian_filter1d,
     label,
     maximum_filter1d,
@@ -58,15 +59,22 @@ LEAST_WIDTH_PX, THIN_PX, THIN = 4.0, 7.5, 0.75
 MANY = 3.2
 
 
+# Standard deviations, and the share of contrast, from which an abrupt step counts with others.
+ABRUPT_TIMES, ABRUPT = 8.0, 0.04
+
+
 NAMES: Final = (
     "gap", "waist", "notch", "doubled", "swollen", "kinked", "darkness", "width", "aside",
+    "ledge", "seam",
 )  # fmt: skip
 """Signs along a fibre.
 
 gap, waist, notch: the ground shines through the middle, over the whole width, or at one side;
 doubled: a stretch takes more light away; swollen: in one place the fibre is wider, or takes more
 light away; kinked: it turns more within a width than before and after; darkness, width, aside:
-steps of contrast, of width and of the centre line.
+steps of contrast, of width and of the centre line; ledge, seam: an edge, or the darkness between
+the edges, steps abruptly where a fibre of its own slope would not. The last two are never a reason
+by themselves.
 """
 
 
@@ -150,7 +158,8 @@ def joints(scene: Scene, course: Course) -> Joints:
         _kinked(line, side * course.width, seen, course.width, blur),
         *(_stepped(values, seen, course.width, blur, least) for values, least in steps),
     ]
-    return _joints([*signs, *(part * each for each in others)], course.width, breaks)
+    abrupt = _abrupt(height, across, (seen, typical), course.width, blur)
+    return _joints([*signs, *(part * each for each in others), *abrupt], course.width, breaks)
 
 
 def _breaks(dip: Floats, clear: Flags) -> Floats:
@@ -219,6 +228,45 @@ def _notch(
     outer /= max(middle(outer[where[0]]), 1e-6)
     fine = _uneven(outer, blur, 2 * int(3.0 * width) + 1)
     return _beyond(-fine, *where, NOTCH)
+
+
+def _abrupt(
+    height: Floats32, across: Floats32, where: tuple[Flags, float], width: float, blur: float
+) -> list[Floats]:
+    """Return how clearly the edges, and what lies between them, step within a width.
+
+    Of a stretch of a width to each side the slope is taken away: thickness and darkness of one
+    fibre change too, but over more than a width.
+    """
+    seen, typical = where
+    edge = max(1.5, 1.5 * blur)
+    inner, outer = 0.5 * width - edge, 0.5 * width + edge
+    values = np.array(
+        [
+            height[:, (across >= -outer) & (across < -inner)].sum(axis=1),
+            height[:, (across > inner) & (across <= outer)].sum(axis=1),
+            height[:, np.abs(across) <= max(1.0, inner)].mean(axis=1),
+        ],
+        dtype=np.float64,
+    )
+    size = max(4, int(width))
+    none = np.zeros((2, len(seen)))
+    if len(seen) < 2 * size + 1:
+        return [none, none]
+    away = np.arange(-size, size + 1)
+    sides = np.sign(away) * (np.abs(away) > round(0.5 * blur))
+    kernel = sides - (sides @ away) / (away @ away) * away
+    step = correlate1d(
+        values / typical, kernel / np.abs(kernel @ np.sign(away)), axis=1, mode="nearest"
+    )
+    spread = 1.4826 * np.median(np.abs(step[:, seen]), axis=1)
+    least = ABRUPT * np.array([1.0, 1.0, 0.7])
+    many = max(1.0, math.sqrt(2.0 * math.log(max(int(seen.sum()), 2))) / MANY)
+    clear = np.abs(step) / (many * ABRUPT_TIMES * np.maximum(spread, least))[:, None]
+    clear = np.minimum(np.where(seen, clear, 0.0), 2.0)
+    reach = 2 * int(0.5 * width) + 1
+    left, right, middle_part = maximum_filter1d(clear, reach, axis=1, mode="nearest")
+    return [np.stack([none[0], np.hypot(left, right)]), np.stack([none[0], middle_part])]
 
 
 def _kinked(line: Floats, aside_px: Floats, seen: Flags, width: float, blur: float) -> Floats:

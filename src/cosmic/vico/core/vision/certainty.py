@@ -24,17 +24,19 @@ from cosmic.vico.core.vision.refine import Course
 CERTAIN: Final = 0.999
 IMPROBABLE: Final = "weak signs together make it less than certain that it is one whole fibre"
 
-NAMES: Final = (*axial.NAMES, "goes on", "soft")
-WEIGHTS: Final = (2.0, 1.7, 2.9, 0.4, 1.6, 4.6, 2.0, 1.7, 0.1, 1.5, 2.6)
-"""Fitted to 998 fibres and pairs; a tenth is a floor."""
-FITTED_LOGIT: Final = 10.11
+NAMES: Final = (*axial.NAMES, "goes on", "soft", "compressed")
+WEIGHTS: Final = (0.9, 0.6, 1.7, 1.0, 0.1, 3.6, 1.6, 1.4, 0.1, 1.6, 2.2, 3.4, 3.1, 1.5)
+"""Fitted to 4022 fibres and pairs; a tenth is a floor."""
+FITTED_LOGIT: Final = 5.65
 """Logit of the probability where there is no sign, on images of which a half is no single fibre."""
-FITTED_ODDS: Final = 1.45
-PRIOR_ODDS: Final = 99.0
-"""Whole fibres for each that is two or a part, among what is found: a guess."""
+FITTED_ODDS: Final = 1.0
+PRIOR_ODDS: Final = 60.0
+"""Whole fibres for each that is two or a part, among what is found: a guess, on the safe side."""
 ALONE: Final = FITTED_LOGIT + log(PRIOR_ODDS / FITTED_ODDS)
 DOUBT: Final = 6.0
 """What each reason to doubt takes off: a guess."""
+NOISE: Final = 0.25
+"""So clear is a sign in the clearest place of any fibre: only what is above it counts."""
 MOST_ALONG: Final = 4.0
 MOST: Final = 1.5
 INTERVAL_STDS: Final = 2.0
@@ -52,6 +54,7 @@ class Signs:
     joints: Joints = field(default_factory=Joints)
     goes_on: float = 0.0
     soft: float = 0.0
+    compressed: float = 0.0
 
     @property
     def doubts(self) -> list[str]:
@@ -66,18 +69,22 @@ class Signs:
     @property
     def values(self) -> tuple[float, ...]:
         """Each sign in the order of `NAMES`, from nothing to `MOST`, where they weigh most."""
-        return tuple(self.weighed_by(WEIGHTS).tolist())
+        return tuple(self._at(WEIGHTS).tolist())
 
     def weighed_by(self, weights: Sequence[float]) -> Floats:
-        """Return each sign in the order of `NAMES`.
+        """Return what is above noise of each sign, in the order of `NAMES`.
 
         Those along the fibre are of the one place where together they weigh most: a joint is in
         one place, the unevenness of one fibre is scattered.
         """
+        return np.maximum(self._at(weights) - NOISE, 0.0)
+
+    def _at(self, weights: Sequence[float]) -> Floats:
         along = np.minimum(self.joints.along, MOST_ALONG)
-        place = int(np.argmax(np.asarray(weights[: len(along)]) @ along))
-        ends = np.clip([self.goes_on, self.soft], 0.0, MOST)
-        return np.concatenate([along[:, place], ends])
+        above = np.maximum(along - NOISE, 0.0)
+        place = int(np.argmax(np.asarray(weights[: len(along)]) @ above))
+        whole = np.clip([self.goes_on, self.soft, self.compressed], 0.0, MOST)
+        return np.concatenate([along[:, place], whole])
 
 
 def signs_of(scene: Scene, course: Course, explained: Mask) -> Signs:
@@ -86,6 +93,7 @@ def signs_of(scene: Scene, course: Course, explained: Mask) -> Signs:
         axial.joints(scene, course),
         beyond.goes_on(scene, course, explained),
         beyond.soft(course),
+        scene.blockiness,
     )
 
 
@@ -93,7 +101,7 @@ def probability(signs: Signs, doubts: Sequence[str]) -> float:
     """Return how probable it is that something is one whole fibre."""
     if not CUT_OFF.isdisjoint(doubts):
         return 0.0
-    taken = sum(weight * value for weight, value in zip(WEIGHTS, signs.values, strict=True))
+    taken = float(signs.weighed_by(WEIGHTS) @ np.asarray(WEIGHTS))
     return 1.0 / (1.0 + exp(taken + DOUBT * len({*doubts, *signs.doubts}) - ALONE))
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.spatial import cKDTree
 
 from cosmic.vico.core.vision.ends import EndKind
@@ -25,6 +26,8 @@ RUNS_ON = (EndKind.BODY, EndKind.LOST)
 EDGING = "it lies along the edge of something wider"
 DIRTY_END = "at an end its edges are not seen: dirt may lie there"
 SHARP = "it bends more sharply than its own width"
+# Of stretches along a fibre, what so many per cent differ by is its own unevenness.
+OWN_UNEVENNESS = 90.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,18 +111,25 @@ def dirty_end(course: Course) -> bool:
 def uneven_ends(course: Course) -> float:
     """Return by how many pixels more of a fibre is missing at one end than at the other.
 
-    A speck of dirt that lengthens it is seldom as dark as the fibre.
+    A speck of dirt that lengthens it is seldom as dark as the fibre. What stretches elsewhere
+    along the fibre miss of the stretch beside them is its own unevenness, and no dirt.
     """
     count = max(6, int(2.5 * course.width / STEP_PX))
     if len(course.contrast) < 4 * count:
         return 0.0
-    missing = []
-    for values in (course.contrast, course.contrast[::-1]):
-        usual = float(np.median(values[count : 2 * count]))
-        missing.append(
-            STEP_PX * float(np.maximum(1.0 - values[:count] / max(usual, 1e-6), 0).sum())
-        )
-    return abs(missing[0] - missing[1])
+    inner = course.contrast[count:-count]
+    ends = [_missing(each[: 2 * count], count) for each in (course.contrast, course.contrast[::-1])]
+    own = np.concatenate([_missing(each, count) for each in (inner, inner[::-1])])
+    more = abs(float(ends[0][0] - ends[1][0]))
+    return max(0.0, more - float(np.percentile(own, OWN_UNEVENNESS)))
+
+
+def _missing(values: Floats, count: int) -> Floats:
+    """Return how many pixels stretches of `count` points miss, by the height of the next one."""
+    windows = sliding_window_view(values, count)
+    first = np.arange(0, len(values) - 2 * count + 1, max(1, count // 4))
+    usual = np.maximum(np.median(windows[first + count], axis=1), 1e-6)
+    return np.asarray(STEP_PX * np.maximum(1.0 - windows[first] / usual[:, None], 0.0).sum(axis=1))
 
 
 def width_spread(course: Course) -> float:

@@ -22,7 +22,7 @@ from cosmic.vico.core.vision.measures import (
 from cosmic.vico.core.vision.parting import parted_at_gaps, separated
 from cosmic.vico.core.vision.profiles import Scene
 from cosmic.vico.core.vision.refine import Course, near_ends, neighbours_of, refine
-from cosmic.vico.core.vision.relief import find_relief, level_step
+from cosmic.vico.core.vision.relief import blockiness, find_relief, level_step
 from cosmic.vico.core.vision.section import (
     APERTURE_PX,
     FEWEST_ROWS,
@@ -92,6 +92,7 @@ def _found(pixels: Pixels) -> list[Fibre]:
         relief.factor,
         1.0 if relief.lighter else -1.0,
         1.0 if pixels.dtype == np.uint8 else level_step(pixels),
+        blockiness(pixels),
     )
     least = max(LEAST_PX, LEAST_OF_IMAGE * float(np.hypot(*pixels.shape)))
     kept = [each for each in strands(graph) if long_enough(each, relief.factor, least)]

@@ -86,6 +86,8 @@ class Scene:
         1 for fibres lighter than the ground, -1 for darker ones.
     step : float
         One of 256 levels of the range that the image uses.
+    blockiness : float
+        By how much more neighbours differ across borders of 8 x 8 pixels than elsewhere: JPEG.
     """
 
     image: Floats32
@@ -93,6 +95,7 @@ class Scene:
     factor: int
     sign: float
     step: float = 1.0
+    blockiness: float = 0.0
 
     @property
     def corner(self) -> Floats:
