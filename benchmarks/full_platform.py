@@ -59,21 +59,8 @@ class FullStand(Stand):
 
 
 @contextmanager
-def full_platform(
-    *,
-    campaign: bool = True,
-    seed: int = 1,
-    sample: str | None = SAMPLE,
-    size: tuple[int, int] = (1600, 1000),
-    **how: Any,
-) -> Iterator[FullStand]:
-    """Set up the shipped platform with its whole window, recording and with its camera live.
-
-    Parameters
-    ----------
-    how
-        What else `build_platform` is asked for.
-    """
+def full_platform(*, campaign: bool = True, seed: int = 1) -> Iterator[FullStand]:
+    """Set up the shipped platform with its whole window, recording and with its camera live."""
     app = application()
     load = sim_controllers.load_simulated_scu3d
     traced: list[Any] = []
@@ -89,9 +76,8 @@ def full_platform(
         beside = at_end.enter_context(_campaign(folder, seed)) if campaign else None
         with patch.object(sim_controllers, "load_simulated_scu3d", traced_library):
             platform = build_platform(
-                sample=sample,
+                sample=SAMPLE,
                 seed=seed,
-                **how,
                 mico_gui=make_mico_gui,
                 daqco_gui=make_daqco_gui,
                 vico_gui=make_vico_gui,
@@ -104,7 +90,7 @@ def full_platform(
         at_end.callback(window.deleteLater)
         at_end.callback(window.close_now)
         window.show()
-        window.resize(*size)
+        window.resize(1600, 1000)
         rig = Rig(platform, "benchmark")
         window.open_hardware()
         timer = QTimer(window, interval=REPAINT_MS)

@@ -242,6 +242,20 @@ def shown(window: OperatorWindow) -> set[str]:
     return {each.windowTitle() for each in docks if each.isVisible()}
 
 
+def test_a_wide_panel_gets_room_while_it_is_in_front(own: OperatorWindow, qtbot: QtBot) -> None:
+    own.resize(*SIZES["1366x768"])
+    own.workspaces.choose(HANDLE)
+    tool, wide = own.dock("Tool"), own.dock("Trajectories")
+    qtbot.waitUntil(lambda: tool.isVisible() and own.width() == 1366)
+    before_px = tool.width()
+    own.raise_panel("Trajectories")
+    qtbot.waitUntil(lambda: wide.width() > before_px)
+    (scrolled,) = [each for each in wide.findChildren(QScrollArea) if each.isVisible()][:1]
+    qtbot.waitUntil(lambda: not scrolled.horizontalScrollBar().isVisible())
+    own.raise_panel("Tool")
+    qtbot.waitUntil(lambda: abs(tool.width() - before_px) < 10)
+
+
 def test_a_layout_is_kept_by_name_and_reset(make: Make, qtbot: QtBot, stored: QSettings) -> None:
     window = make(applications=("mico", "daqco", "vico"), hardware=False)
     spaces = window.workspaces

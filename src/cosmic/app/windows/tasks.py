@@ -64,6 +64,7 @@ _LEFT: Final = Area.LeftDockWidgetArea
 _RIGHT: Final = Area.RightDockWidgetArea
 _FORMULA: Final = "force/calculated"
 _COACH_PX: Final = 17 * STEP_PX
+_WIDE_PX: Final = 47 * STEP_PX
 WATCH_MS: Final = 500
 
 
@@ -106,9 +107,9 @@ def workspaces(others: tuple[str, ...] = ()) -> tuple[Workspace, ...]:
             "Move one tool: pad, targets, poses, trajectories, gamepad",
             (
                 _left(TOOL),
-                PanelPlacement(TRAJECTORIES, _LEFT, tabbed=TOOL, shown=False),
-                PanelPlacement(RECORDER, _LEFT, tabbed=TOOL, shown=False),
-                PanelPlacement(TELEOPERATION, _LEFT, tabbed=TOOL, shown=False),
+                PanelPlacement(TRAJECTORIES, _LEFT, tabbed=TOOL, least_px=_WIDE_PX, shown=False),
+                PanelPlacement(RECORDER, _LEFT, tabbed=TOOL, least_px=_WIDE_PX, shown=False),
+                PanelPlacement(TELEOPERATION, _LEFT, tabbed=TOOL, least_px=_WIDE_PX, shown=False),
                 _right(FORCE),
                 _coach(FORCE),
             ),

@@ -2,6 +2,7 @@
 
 import zlib
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from PySide6.QtCore import QByteArray, QObject, QSettings, QSize, Qt, QTimer, Signal
@@ -32,7 +33,8 @@ class PanelPlacement:
     share : float
         Part of the window's width, 0 to 1; 0 leaves it to Qt.
     least_px, most_px : int
-        Bounds of that width.
+        Bounds of that width. One that shares its place makes it as wide as its `least_px` while it
+        is in front, where the window has room for that.
     height_px : int
         Its height; 0 leaves it to Qt.
     shown : bool
@@ -87,6 +89,10 @@ class _Kept:
     panels: tuple[str, ...]
 
 
+MOST_PART: Final = 3.25
+"""Times as wide as a panel the window is at least where that is given more room."""
+
+
 class Workspaces(QObject):
     """Lays the docks of a window out for the task in hand; GUI thread.
 
@@ -119,6 +125,7 @@ class Workspaces(QObject):
         self._laying = False
         self._current = ""
         self._layout = str(settings.value(_LAYOUT, USUAL)) or USUAL
+        self._narrow_px: dict[str, int] = {}
 
     def add_dock(self, dock: QDockWidget) -> None:
         """Take a panel in; it is shown where a workspace has a place for it."""
@@ -128,6 +135,7 @@ class Workspaces(QObject):
         action.triggered.connect(self._on_toggled)
         dock.topLevelChanged.connect(self._on_altered)
         dock.dockLocationChanged.connect(self._on_altered)
+        dock.visibilityChanged.connect(self._on_seen)
 
     def add(self, workspace: Workspace) -> None:
         """Add a workspace; the order is that of the buttons."""
@@ -353,6 +361,30 @@ class Workspaces(QObject):
         else:
             area = placement.area if placement is not None else Area.RightDockWidgetArea
             self._window.addDockWidget(area, dock)
+
+    def _on_seen(self, seen: bool) -> None:
+        """Give a panel that comes to the front of its place room, once it is laid out."""
+        dock = self.sender()
+        if seen and not self._laying and isinstance(dock, QDockWidget):
+            QTimer.singleShot(0, self, partial(self._make_room, dock.windowTitle()))
+
+    def _make_room(self, title: str) -> None:
+        workspace, dock = self._known.get(self._current), self._docks[title]
+        placements = workspace.placements if workspace is not None else ()
+        placement = next((each for each in placements if each.title == title), None)
+        if placement is None or dock.isFloating() or not dock.isVisible():
+            return
+        least_px = placement.least_px
+        if not placement.tabbed:
+            before_px = self._narrow_px.pop(title, 0)
+            if before_px:
+                self._widen(dock, before_px)
+        elif dock.width() < least_px and self._window.width() >= MOST_PART * least_px:
+            self._narrow_px.setdefault(placement.tabbed, dock.width())
+            self._widen(dock, least_px)
+
+    def _widen(self, dock: QDockWidget, width_px: int) -> None:
+        self._window.resizeDocks([dock], [width_px], Qt.Orientation.Horizontal)
 
     def _on_toggled(self, shown: bool) -> None:
         self._altered = True
