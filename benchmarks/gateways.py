@@ -1,10 +1,12 @@
-"""A read and a move over HTTP and EPICS beside the scripted API, in one run.
+"""A read, a move and images over HTTP and EPICS beside the scripted API and a station, in one run.
 
 The scripted API is measured in this process, HTTP and EPICS against a station in a process of its
 own, one after the other. A move goes 1 um there or back and is measured until the axis is at rest
-and the caller knows it: an EPICS put by design ends 80 ms after that.
+and the caller knows it: an EPICS put by design ends 80 ms after that. Images are those of a live
+camera, followed by one client at a time; HTTP sends them as a page shows them, compressed.
 """
 
+import json
 import logging
 import os
 import tempfile
@@ -35,6 +37,7 @@ class Served:
 
     http: httpx.Client
     epics_port: int
+    station: str
 
 
 @contextmanager
@@ -44,9 +47,11 @@ def served() -> Iterator[Served]:
     more = {"EPICS_CA_SERVER_PORT": str(records)}
     with (
         tempfile.TemporaryDirectory() as folder,
-        served_program(Path(folder), web, line, "--epics", "BENCH:", variables=more) as program,
+        served_program(
+            Path(folder), web, line, "--epics", "BENCH:", "--name", "bench", variables=more
+        ) as program,
     ):
-        yield Served(program.http, records)
+        yield Served(program.http, records, f"tcp/127.0.0.1:{line}")
 
 
 def timed_ms(action: Callable[[], object], count: int) -> list[float]:
@@ -122,6 +127,76 @@ def over_epics(port: int, reads: int, moves: int) -> tuple[list[float], list[flo
     return read, moved
 
 
+@dataclass
+class Came:
+    """What came of images, counted by whoever receives them."""
+
+    images: int = 0
+    size: int = 0
+
+    def add(self, size: int) -> None:
+        """Count an image of `size` bytes."""
+        self.images += 1
+        self.size += size
+
+    def rows(self, door: str, seconds: float) -> list[Figure]:
+        """Return them a second."""
+        return [
+            Figure(NAME, f"{door}: images", self.images / seconds, "Hz"),
+            Figure(NAME, f"{door}: bytes of images", self.size / 1e6 / seconds, "MB/s"),
+        ]
+
+
+def images_by_station(endpoint: str, seconds: float) -> list[Figure]:
+    """Follow a camera as a program does that uses the platform as a station; it stays live."""
+    came = Came()
+    with cosmic.connect(applications=(), stations={"bench": endpoint}) as rig:
+        camera = rig.vico.camera()
+        camera.start().wait(20.0)
+        end = camera.watch_frames(lambda image: came.add(image.data.nbytes))
+        time.sleep(seconds)
+        end()
+    return came.rows("station", seconds)
+
+
+def images_by_http(http: httpx.Client, seconds: float) -> list[Figure]:
+    """Follow a camera as the page does."""
+    from websockets.sync.client import connect
+
+    cameras = http.get("/api/vico/state/camera_handles").raise_for_status().json()
+    topic = f"vico/camera_handles/{next(iter(cameras))}/shown"
+    token = http.headers["Authorization"].removeprefix("Bearer ")
+    address = str(http.base_url).rstrip("/").replace("http", "ws", 1)
+    came, until_s = Came(), time.perf_counter() + seconds
+    with connect(f"{address}/api/events", max_size=None) as line:
+        line.send(json.dumps({"token": token, "follow": [topic]}))
+        while time.perf_counter() < until_s:
+            message = line.recv(timeout=20.0)
+            if isinstance(message, bytes):
+                came.add(len(message))
+    return came.rows("HTTP", seconds)
+
+
+def images_by_epics(seconds: float) -> list[Figure]:
+    """Monitor the array of a camera's image."""
+    from caproto.threading.client import Context
+
+    context: Any = Context()
+    (array,) = context.get_pvs("BENCH:microscope:image:ArrayData")
+    array.wait_for_connection(timeout=30)
+    came = Came()
+
+    def take(_subscription: object, response: Any) -> None:
+        came.add(len(response.data))
+
+    subscription = array.subscribe()
+    subscription.add_callback(take)
+    time.sleep(seconds)
+    subscription.clear()
+    context.disconnect()
+    return came.rows("EPICS", seconds)
+
+
 def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of one run."""
     logging.getLogger("cosmic").setLevel(logging.ERROR)
@@ -136,6 +211,10 @@ def measure(quick: bool = False) -> list[Figure]:
             "HTTP": over_http(station.http, reads, moves),
             "EPICS": over_epics(station.epics_port, reads, moves),
         }
+        seconds = 2.0 if quick else 15.0
+        seen = images_by_station(station.station, seconds)
+        seen += images_by_http(station.http, seconds)
+        seen += images_by_epics(seconds)
     for door, (read, moved) in found.items():
         figures += [
             Figure(NAME, f"{door}: read, p50", percentile(read, 50), "ms"),
@@ -145,7 +224,7 @@ def measure(quick: bool = False) -> list[Figure]:
             Figure(NAME, f"{door}: move of 1 um, p99", percentile(moved, 99), "ms"),
             Figure(NAME, f"{door}: move to scripted, p50", _ratio(moved, own_moved), ""),
         ]
-    return figures
+    return figures + seen
 
 
 def _ratio(of: list[float], to: list[float]) -> float:

@@ -15,14 +15,16 @@ from typing import Final
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
-from PySide6.QtCore import QPointF, QSettings
-from PySide6.QtWidgets import QApplication, QMenu, QPushButton
+from PySide6.QtCore import QPointF, QSettings, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QPushButton, QWidget
 
+from cosmic.app.panels.campaign.panel import CampaignPanel
 from cosmic.app.platform import build_platform
 from cosmic.app.rig import Rig
 from cosmic.app.windows.fibre_menu import FibreOperations
 from cosmic.app.windows.operator_window import OperatorWindow
-from cosmic.app.windows.tasks import HANDLE, LOOK, MEASURE, SET_UP, TaskLayout
+from cosmic.app.windows.tasks import CAMPAIGN, HANDLE, LOOK, MEASURE, SET_UP, TaskLayout
 from cosmic.daqco.gui.main_widget import make_daqco_gui
 from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.theme import State
@@ -124,7 +126,7 @@ class Scene:
 
     def close(self) -> None:
         """Close the window."""
-        self.window.close()
+        self.window.close_now()
         self._undo()
 
 
@@ -302,6 +304,57 @@ def record_and_repeat(scene: Scene) -> None:
     scene.save("record-and-repeat")
 
 
+def path_preview(scene: Scene) -> None:
+    """Show a detour that is offered."""
+    mico, tool = scene.rig.mico, scene.tasks.tool
+
+    def bring() -> None:
+        mico["right.x"].move_to(-4500.0)
+        mico["left.y"].move_to(-2000.0)
+        mico["left.x"].move_to(4000.0)
+
+    scene.behind(bring)
+    scene.choose(HANDLE)
+    scene.window.top_bar.mode_requested.emit("ECM")
+    tool.choose("left")
+    scene.wait(1.0)
+    scene.window.raise_panel("Scene")
+    (target,) = (
+        each for each in _targets(tool) if each.accessibleName().startswith("Target of left.y")
+    )
+    target.setFocus()
+    target.selectAll()
+    QTest.keyClicks(target, "2000")
+    QTest.keyClick(target, Qt.Key.Key_Return)
+    scene.wait(8.0)
+    scene.save("path-preview")
+
+
+def _targets(tool: QWidget) -> list[QLineEdit]:
+    return [each for each in tool.findChildren(QLineEdit, "toolTarget") if each.isVisible()]
+
+
+def characterise_a_sample(scene: Scene) -> None:
+    """Show the first fibre of a campaign, while the second is worked on."""
+    scene.choose(CAMPAIGN)
+    panel = scene.window.findChild(CampaignPanel)
+    if panel is None:
+        raise RuntimeError("the window has no campaigns")
+    panel.use_recipe("quick")
+    panel.folder.setText(str(scene.folder / "quick"))
+    panel.procedure.start.click()
+    scene.until(lambda: panel.campaign is not None and len(panel.campaign.fibres) > 0)
+    scene.wait(3.0)
+    panel.show_fibre(1)
+    scene.wait(1.0)
+    panel.folder.setText("campaigns/quick")
+    scene.save("characterise-a-sample")
+    if panel.campaign is not None:
+        campaign = panel.campaign
+        campaign.abort("the image is there")
+        scene.until(lambda: campaign.over)
+
+
 def _done(scene: Scene, title: str) -> None:
     """Wait until an operation on a fibre has ended, well."""
     operations = scene.tasks.operations
@@ -380,6 +433,8 @@ SCENES: Final[dict[str, Callable[[Scene], None]]] = {
     "steer-with-a-gamepad": steer_with_a_gamepad,
     "look-at-a-fibre": look_at_a_fibre,
     "record-and-repeat": record_and_repeat,
+    "path-preview": path_preview,
+    "characterise-a-sample": characterise_a_sample,
     "tour": tour,
 }
 
@@ -394,13 +449,13 @@ def main(names: list[str]) -> int:
     end = declare_gui_thread()
     for name in names or list(SCENES):
         with tempfile.TemporaryDirectory() as folder:
-            on_the_plate = name in ("tour", "look-at-a-fibre")
+            on_the_plate = name in ("tour", "look-at-a-fibre", "characterise-a-sample")
             scene = Scene(
                 app,
                 Path(folder),
                 cold=name in ("initialise", "first-day"),
                 sample="three-dry" if on_the_plate else None,
-                rate=FAST if name == "tour" else 1.0,
+                rate=FAST if name in ("tour", "characterise-a-sample") else 1.0,
             )
             try:
                 SCENES[name](scene)
