@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import cosmic
+from cosmic.autonomy.control.handle import ControlHandle
 from cosmic.autonomy.control.pid import PidGains
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import LimitSettings
@@ -144,6 +145,8 @@ def test_odd_arguments_of_what_runs_are_named_and_break_nothing(
                 wrong[found] = None
     rig.stop("the test")
     rig.reset_stop()
+    if isinstance(handle, ControlHandle):
+        handle.join()
     assert not wrong, "\n".join(wrong)
     assert tries > 0
 

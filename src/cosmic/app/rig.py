@@ -73,16 +73,16 @@ class Rig:
         self._vico = vico_of(platform.vico) if platform.vico is not None else None
         self._shared, self._first = shared or SharedRuns(), shared is None
         self._control: Control | None = None
-        if self._mico is not None:
-            if self._shared.control is None:
-                self._shared.control = Control(
-                    self._mico,
-                    self._daqco,
-                    platform.file.control,
-                    platform.policy,
-                    rate=platform.clock.rate,
-                )
+        if self._mico is not None and self._shared.control is not None:
             self._control = self._shared.control.commanding_by(self._mico)
+        elif self._mico is not None:
+            self._control = self._shared.control = Control(
+                self._mico,
+                self._daqco,
+                platform.file.control,
+                platform.policy,
+                rate=platform.clock.rate,
+            )
         self._handling: FibreHandling | None = None
 
     def commanding_as(self, source: str) -> "Rig":

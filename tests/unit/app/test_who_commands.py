@@ -83,6 +83,8 @@ def test_a_control_loop_moves_by_the_name_of_whoever_began_it() -> None:
         with pytest.raises(NotAvailable, match="already uses it"):
             hold(rig.control)
         loop.wait_settled()
+        console.control.close()
+        assert loop.running, "only who made the platform closes its loops"
         rig.control.stop()
         loop.join()
         assert sources == {"console"}

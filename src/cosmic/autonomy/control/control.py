@@ -59,7 +59,7 @@ class Control:
         self._mico, self._daqco = mico, daqco
         self._policy = policy
         self._rate = rate
-        self._all = loops or RunningLoops(settings)
+        self._all, self._first = loops or RunningLoops(settings), loops is None
 
     @property
     def settings(self) -> ControlSettings:
@@ -71,7 +71,10 @@ class Control:
         self._all.settings = settings
 
     def commanding_by(self, mico: Mico) -> "Control":
-        """Return the same loops, whose movements are logged as those of `mico` from here on."""
+        """Return the same loops; those begun by it move axes by the name of `mico`.
+
+        They are closed by the first alone: closing this one does nothing.
+        """
         return Control(
             mico, self._daqco, self.settings, self._policy, rate=self._rate, loops=self._all
         )
@@ -227,6 +230,8 @@ class Control:
 
     def close(self) -> None:
         """End all loops for good and wait for their threads."""
+        if not self._first:
+            return
         with self._all.lock:
             self._all.closed = True
             handles = list(self._all.by_axis.values())
