@@ -13,7 +13,9 @@ FILTER_S: Final = 0.02
 REST_S: Final = 0.1
 """So long it looks at the force before it moves."""
 SOFTEST_UN_UM: Final = 0.05
-LEARN_UM: Final = 0.5
+LEARN_UM: Final = 1.0
+LEARN_UN: Final = 5.0
+"""A look at the stiffness is over after so long a way, or so large a change of the force."""
 LEARN_S: Final = 0.15
 SHARE: Final = 0.5
 """Part of the room up to the limit that an unforeseen contact may use up."""
@@ -164,9 +166,10 @@ class ForceServo(Law):
             self._mark, self._mark_s = (position, force), 0.0
             return
         travelled = self._goal.direction * (position - self._mark[0])
-        if self._mark_s < LEARN_S or abs(travelled) < LEARN_UM:
+        changed = force - self._mark[1]
+        if self._mark_s < LEARN_S or (abs(travelled) < LEARN_UM and abs(changed) < LEARN_UN):
             return
-        slope = (force - self._mark[1]) / travelled
+        slope = changed / travelled if travelled else 0.0
         self._mark, self._mark_s = (position, force), 0.0
         if self._adapts and slope > 0.0:
             seen = min(max(slope, SOFTEST_UN_UM), self._settings.stiffness_un_um)
