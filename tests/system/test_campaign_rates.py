@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from statistics import fmean
 
 import pytest
 
@@ -15,7 +16,7 @@ procedure = "bend test"
 [sample]
 name = "three-dry"
 [stop]
-count = 1
+count = 3
 [output]
 pictures = false
 html = false
@@ -24,13 +25,18 @@ table = false
 """
 
 
-def one_fibre(rate: float, folder: Path) -> FibreRecord:
-    recipe = folder / "one.toml"
+def all_fibres(rate: float, folder: Path) -> tuple[FibreRecord, ...]:
+    recipe = folder / "three.toml"
     recipe.write_text(RECIPE, encoding="utf-8")
     with cosmic.connect(rate=rate, sample="three-dry", seed=3) as rig:
         rig.campaign(recipe, folder / "out").run_here()
-    (record,) = CampaignReader(folder / "out").fibres()
-    return record
+    return CampaignReader(folder / "out").fibres()
+
+
+def bent(record: FibreRecord) -> BendingResult:
+    assert record.outcome is Outcome.GOOD
+    assert record.bending is not None
+    return record.bending
 
 
 def half_width(bending: BendingResult) -> float:
@@ -40,21 +46,21 @@ def half_width(bending: BendingResult) -> float:
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_one_seed_gives_one_result_at_every_rate(tmp_path: Path) -> None:
-    found = {}
+    first: tuple[FibreRecord, ...] = ()
     for rate in (1.0, 4.0, 20.0):
         folder = tmp_path / f"{rate:g}"
         folder.mkdir()
-        found[rate] = one_fibre(rate, folder)
-    first = found[1.0]
-    assert first.bending is not None
-    for record in found.values():
-        assert record.outcome is Outcome.GOOD
-        assert record.bending is not None
-        # Repeated, a rate differs from itself by 2.7 % (one standard deviation of nine campaigns):
-        # noise falls elsewhere. What may not be is a difference their intervals do not know.
-        difference = record.bending.ei_n_m2 - first.bending.ei_n_m2
-        assert abs(difference) <= math.hypot(half_width(record.bending), half_width(first.bending))
-        assert record.bending.ei_n_m2 == pytest.approx(first.bending.ei_n_m2, rel=0.15)
-        assert record.shape.length_um == pytest.approx(first.shape.length_um, rel=0.01)
-        # 15 % where the computer is quiet; at the pace of before it was 20 times as long.
-        assert record.duration_s == pytest.approx(first.duration_s, rel=0.5)
+        found = all_fibres(rate, folder)
+        first = first or found
+        assert len(found) == 3
+        ratios = []
+        for record, other in zip(found, first, strict=True):
+            one, two = bent(record), bent(other)
+            ratios.append(one.ei_n_m2 / two.ei_n_m2)
+            difference = abs(one.ei_n_m2 - two.ei_n_m2)
+            assert difference <= math.hypot(half_width(one), half_width(two))
+            assert record.shape.length_um == pytest.approx(other.shape.length_um, rel=0.01)
+            # 15 % where the computer is quiet; at the pace of before it was 20 times as long.
+            assert record.duration_s == pytest.approx(other.duration_s, rel=0.5)
+        # Noise falls elsewhere in each campaign: one fibre varies by 1.4 %, sometimes by 3.
+        assert fmean(ratios) == pytest.approx(1.0, rel=0.05)
