@@ -86,8 +86,10 @@ def test_a_sign_that_becomes_clearer_lowers_the_probability() -> None:
 
 
 def test_weak_signs_count_together_where_they_lie_in_one_place() -> None:
-    scattered = np.diag(np.full(len(NAMES), 0.9))
+    weak = 0.9  # From 1 on a sign counts by itself.
+    scattered = np.diag(np.full(len(NAMES), weak))
     together = np.zeros_like(scattered)
-    together[:, 3] = 0.9
+    together[:, 3] = weak
     uneven, joint = (Signs(Joints(along=along)) for along in (scattered, together))
-    assert probability(uneven, []) >= CERTAIN > probability(joint, [])
+    assert probability(uneven, []) >= CERTAIN
+    assert probability(joint, []) < 0.9
