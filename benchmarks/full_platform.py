@@ -59,8 +59,13 @@ class FullStand(Stand):
 
 
 @contextmanager
-def full_platform(*, campaign: bool = True, seed: int = 1) -> Iterator[FullStand]:
-    """Set up the shipped platform with its whole window, recording and with its camera live."""
+def full_platform(
+    *, campaign: bool = True, repainted: bool = True, seed: int = 1
+) -> Iterator[FullStand]:
+    """Set up the shipped platform with its whole window, recording and with its camera live.
+
+    The panels of the axes are painted all the time unless `repainted` is False.
+    """
     app = application()
     load = sim_controllers.load_simulated_scu3d
     traced: list[Any] = []
@@ -94,7 +99,7 @@ def full_platform(*, campaign: bool = True, seed: int = 1) -> Iterator[FullStand
         rig = Rig(platform, "benchmark")
         window.open_hardware()
         timer = QTimer(window, interval=REPAINT_MS)
-        if window.mico_gui is not None:
+        if repainted and window.mico_gui is not None:
             timer.timeout.connect(window.mico_gui.update)
             timer.start()
         yield FullStand(

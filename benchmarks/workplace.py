@@ -1,4 +1,4 @@
-"""What an operator waits for in the window while a campaign runs beside it in the same process.
+"""What an operator waits for in the window while its platform carries out a campaign.
 
 From an input in the queue of the window's thread until what it changes is painted: a pressed
 button, another workspace, another theme. Besides: how many of the camera's images are shown, how
@@ -9,13 +9,15 @@ import statistics
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, Signal
 from PySide6.QtTest import QTest
 from typing_extensions import override
 
 from benchmarks.figures import Figure, main, percentile
-from benchmarks.full_platform import FullStand, full_platform
+from benchmarks.full_platform import RECIPE, FullStand, full_platform
 from benchmarks.stand import wait_until
 from benchmarks.web_clients import Looker, live_view
 from cosmic.app.panels.force import ForcePanel
@@ -129,17 +131,25 @@ def close_ms(stand: FullStand) -> float:
 def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of one run."""
     clicks, rounds, seconds = (3, 1, 1.0) if quick else (200, 10, 20.0)
-    with full_platform() as stand:
+    with TemporaryDirectory() as folder, full_platform(campaign=False, repainted=False) as stand:
         looker = Looker(live_view(stand))
         stand.window.workspaces.choose(HANDLE)
         plot = next(each for each in stand.window.findChildren(ForcePanel) if each.isVisible())
         stand.app.setQuitOnLastWindowClosed(False)
+        campaign = stand.rig.campaign(RECIPE, Path(folder) / "campaign")
 
         def work() -> list[Figure]:
+            campaign.start()
             figures = live(stand, looker, plot, seconds) + inputs(stand, clicks, rounds)
+            if campaign.over:
+                raise RuntimeError(f"the campaign ended: {campaign.end_reason}")
             return [*figures, Figure(NAME, "closing", close_ms(stand), "ms", CLOSE_MS)]
 
-        return stand.beside(work)
+        try:
+            return stand.beside(work)
+        finally:
+            campaign.abort()
+            campaign.join()
 
 
 if __name__ == "__main__":
