@@ -38,3 +38,10 @@ def test_where_the_whole_has_no_room_a_shorter_text_is_shown_and_no_number_is_cu
         label.resize(width, 20)
         assert label.shown_text == text
     assert label.toolTip() == texts[0]
+
+
+def test_units_are_shown_with_their_micro_sign(qtbot):
+    label = ElidedLabel("force reached 140.1 uN, 3 um from the plate")
+    qtbot.addWidget(label)
+    assert label.text() == "force reached 140.1 µN, 3 µm from the plate"
+    assert label.accessibleName() == label.text()

@@ -80,6 +80,18 @@ def test_a_device_and_a_profile_are_chosen_and_steering_is_begun_and_ended(qtbot
     assert panel.devices.isEnabled()
 
 
+def test_what_a_script_steers_is_what_the_panel_shows(qtbot, panel):
+    choose(panel, HAPTIC, "stylus")
+    teleoperation(panel).start("keyboard:window", "sticks")
+    qtbot.waitUntil(lambda: panel.start.text() == "Stop")
+    assert panel.devices.currentData() == "keyboard:window"
+    assert panel.profiles.currentText() == "sticks"
+
+
+def test_it_fits_the_wide_column_beside_the_image(panel):
+    assert panel.minimumSizeHint().width() <= 376
+
+
 def test_bars_and_velocities_follow_the_hand_and_the_force_is_shown(qtbot, panel):
     begin(qtbot, panel)
     haptic(panel).move_hand(y=0.5)

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QHBoxLayout, QTreeWidget, QTreeWidgetItem, QVBoxLa
 
 from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
+from cosmic.frame.units import with_micro_signs
 
 logger = logging.getLogger(__name__)
 
@@ -150,7 +151,8 @@ class AlarmPanel(QWidget):
             state = State.ERROR if each.level is Level.CRITICAL else State.REFUSED
             word = f"{state_look(state).glyph} {each.level}" + ("" if each.lasts else ", over")
             seen = "yes" if each.seen else "no"
-            item = QTreeWidgetItem([f"{each.when:%H:%M:%S}", word, each.cause, each.advice, seen])
+            cause, advice = with_micro_signs(each.cause), with_micro_signs(each.advice)
+            item = QTreeWidgetItem([f"{each.when:%H:%M:%S}", word, cause, advice, seen])
             for column in range(len(HEADS)):
                 item.setToolTip(column, item.text(column))
             if each.seen:

@@ -32,7 +32,7 @@ from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.gui.asking import Asking
 from cosmic.daqco.gui.limit_dialog import LimitDialog
-from cosmic.daqco.gui.limit_indicator import distance
+from cosmic.daqco.gui.limit_indicator import distance, sides_text
 from cosmic.daqco.gui.plot.chart import Chart, Trace
 from cosmic.daqco.gui.plot.inbox import ChunkInbox
 from cosmic.daqco.gui.plot.unit_ranges import UnitRanges
@@ -70,13 +70,6 @@ FORMULA_TIP: Final = (
     "A formula of channels, numbers, + - * /, abs() and sqrt(); Enter draws it, an empty line ends "
     "it. It is shown and not recorded: the channels are"
 )
-
-
-def sides_text(low: float | None, high: float | None) -> str:
-    """Return both sides of a limit in as few signs as say it."""
-    if low is not None and high is not None and low == -high:
-        return f"±{high:g}"
-    return " to ".join("free" if each is None else f"{each:g}" for each in (low, high))
 
 
 class ForcePanel(QWidget):
@@ -468,7 +461,8 @@ class ForcePanel(QWidget):
             return ("▲ no limit",)
         sides = sides_text(limit.settings.low, limit.settings.high)
         if limit.crossed:
-            return f"■ crossed {sides} {unit}", "■ crossed"
+            beyond = sides.removeprefix("up to ").removeprefix("down to ")
+            return f"■ crossed {beyond} {unit}", "■ crossed"
         if not limit.settings.armed:
             return f"▲ DISARMED {sides} {unit}", "▲ DISARMED"
         if value is None:

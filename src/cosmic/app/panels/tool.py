@@ -27,7 +27,7 @@ from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
 from cosmic.frame.operation import Progress
 from cosmic.frame.overrides import override
-from cosmic.frame.units import DISPLAY, format_quantity
+from cosmic.frame.units import DISPLAY, format_quantity, with_micro_signs
 from cosmic.frame.verdict import MoveVerdict, Reason
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
@@ -545,7 +545,7 @@ class ToolPanel(QWidget):
 
     def say(self, text: str) -> None:
         """Say one line below the tool; what a refusal offered is gone. Empty takes it away."""
-        shown = self._stopped or text
+        shown = with_micro_signs(self._stopped or text)
         for button in (self.nearest, self.detour):
             button.hide()
         self.line.setText(shown)

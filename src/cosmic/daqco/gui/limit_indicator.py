@@ -34,11 +34,17 @@ def distance(limit: DaqLimit, value: float) -> float:
     return min(below, math.inf if low is None else value - low)
 
 
+def sides_text(low: float | None, high: float | None) -> str:
+    """Return the sides that a limit has, in as few signs as say it."""
+    if low is None or high is None:
+        return f"up to {high:g}" if high is not None else f"down to {low:g}"
+    return f"±{high:g}" if low == -high else f"{low:g} to {high:g}"
+
+
 def reading(limit: DaqLimit, unit: str, value: float | None) -> LimitReading:
     """Return what is shown of a limit; `value` is None where the channel is not measured."""
     given, shown = limit.settings, display_unit(unit)
-    sides = " to ".join("free" if each is None else f"{each:g}" for each in (given.low, given.high))
-    name = f"{given.channel} limit {sides} {shown}"
+    name = f"{given.channel} limit {sides_text(given.low, given.high)} {shown}"
     if limit.crossed:
         return LimitReading(f"■ {name}: STOPPED", "alarm", limit_text(limit, unit))
     if not given.armed:

@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QLabel, QSizePolicy, QStyle, QStyleOption, QWidget
 from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.theme import current_palette
 from cosmic.frame.overrides import override
+from cosmic.frame.units import with_micro_signs
 
 
 class ElidedLabel(QLabel):
@@ -31,7 +32,7 @@ class ElidedLabel(QLabel):
         self.set_text(text)
 
     def set_text(self, text: str, *shorter: str) -> None:
-        """Show `text`; line ends become spaces, the tooltip has them all.
+        """Show `text` with its micro signs; line ends become spaces, the tooltip has them all.
 
         Of `shorter` the first that has room is shown where the whole has none: a number that is
         cut off is another number.
@@ -39,6 +40,7 @@ class ElidedLabel(QLabel):
         if shorter != self._shorter:
             self._shorter = shorter
             self.update()
+        text = with_micro_signs(text)
         if text == self._whole:  # cards repeat their line at every state that comes
             return
         self._whole = text

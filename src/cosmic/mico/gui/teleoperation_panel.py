@@ -202,21 +202,18 @@ class TeleoperationPanel(QWidget):
         choice.addWidget(self.devices, 3)
         choice.addWidget(self.profiles, 2)
         choice.addWidget(self.start)
-        status_row = QHBoxLayout()
-        status_row.setSpacing(STEP_PX)
-        status_row.addWidget(self.indicator, 3)
-        status_row.addWidget(self.force, 2)
-        pace = QHBoxLayout()
-        pace.setSpacing(STEP_PX // 2)
-        pace.addWidget(self.fine)
-        pace.addWidget(self.rates, 1)
-        pace.addWidget(self.as_configured)
+        rates = QHBoxLayout()
+        rates.setSpacing(STEP_PX // 2)
+        rates.addWidget(self.rates, 1)
+        rates.addWidget(self.as_configured)
         column = QVBoxLayout(self)
         column.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
         column.setSpacing(STEP_PX)
         column.addLayout(choice)
-        column.addLayout(status_row)
-        column.addLayout(pace)
+        column.addWidget(self.indicator)
+        column.addWidget(self.force)
+        column.addWidget(self.fine)
+        column.addLayout(rates)
         column.addWidget(self.message)
         column.addWidget(self.bars)
         column.addWidget(self.table, 1)
@@ -255,6 +252,17 @@ class TeleoperationPanel(QWidget):
                     self.devices.addItem(text, key)
                 self.devices.setCurrentIndex(max(0, self.devices.findData(chosen)))
         self._allow()
+
+    def _show_what_runs(self, state: TeleoperationState) -> None:
+        """Choose what a script has started: what the panel shows is what is steered."""
+        device = state.device
+        if not self._running(state) or device is None:
+            return
+        if self.devices.currentData() != device.key:
+            if self.devices.findData(device.key) < 0:
+                self.devices.addItem(f"{device.title} ({device.kind})", device.key)
+            self.devices.setCurrentIndex(self.devices.findData(device.key))
+        self.profiles.setCurrentText(state.profile)
 
     def _on_look_timer(self) -> None:
         if is_seen(self):
@@ -339,6 +347,7 @@ class TeleoperationPanel(QWidget):
         self.keys.set_enabled(running and by_keys)
         if state.words != self._words:
             self._words = state.words
+            self._show_what_runs(state)
             self._allow()
             self.phase_changed.emit(state.words)
 
