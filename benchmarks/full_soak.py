@@ -1,9 +1,9 @@
 """Everything at once for hours: nothing may grow.
 
 `python -m benchmarks.full_soak --minutes 120`. One platform with its whole window records, a new
-file now and then, with its camera live; chance moves all axes, stops and resets. Beside it, in the
-same process, one platform after the other is made, carries out a campaign and is closed. The first
-quarter is warm-up.
+file now and then, with its camera live; chance moves all axes, stops and resets, and stands still
+for some seconds before each new file. Beside it, in the same process, one platform after the other
+is made, carries out a campaign and is closed. The first quarter is warm-up.
 """
 
 import argparse
@@ -20,11 +20,13 @@ from pathlib import Path
 import cosmic
 from benchmarks.figures import Figure, table
 from benchmarks.full_platform import FullStand, full_platform
-from benchmarks.soak import command, resident_kb, thread_count
+from benchmarks.soak import command, helpers_kb, resident_kb, thread_count
 from cosmic.frame.errors import CosmicError
 
 NAME = "full_soak"
 PARTS = 40
+REST_S = 7.0
+"""Garbage of closed platforms is looked for when nothing has moved for five seconds."""
 RECIPE, RATE = "quick", 5.0
 FILES = Path("/proc/self/fd")
 
@@ -35,6 +37,7 @@ class Look:
 
     minute: float
     resident_mb: float
+    helpers_mb: float
     objects: int
     threads: int
     files: int
@@ -98,6 +101,7 @@ def collect(bench: FullStand, seconds: float, publish: Callable[[Look], None]) -
                     if chance.random() < 0.003:
                         bench.rig.stop("the soak")
                         bench.rig.reset_stop()
+                time.sleep(min(REST_S, 0.1 * seconds / PARTS))
                 bench.rig.daqco.stop_recording()
                 bench.recording.unlink(missing_ok=True)
                 with suppress(CosmicError):
@@ -106,6 +110,7 @@ def collect(bench: FullStand, seconds: float, publish: Callable[[Look], None]) -
                     Look(
                         (time.perf_counter() - began_s) / 60.0,
                         resident_kb() / 1024,
+                        max(helpers_kb(), default=0.0) / 1024,
                         len(gc.get_objects()) + gc.get_freeze_count(),
                         thread_count(),
                         len(list(FILES.iterdir())) if FILES.exists() else 0,
@@ -140,6 +145,7 @@ def figures(looks: list[Look]) -> list[Figure]:
         Figure(NAME, "campaigns carried out", last.campaigns, ""),
         Figure(NAME, "resident set after the first quarter", warm[0].resident_mb, "MB"),
         Figure(NAME, "resident set, growth since", growth("resident_mb"), "MB", 10),
+        Figure(NAME, "largest helper process, growth since", growth("helpers_mb"), "MB", 10),
         Figure(NAME, "Python objects, growth since", growth("objects"), ""),
         Figure(NAME, "threads, growth since", growth("threads"), "", 2),
         Figure(NAME, "open files, growth since", growth("files"), "", 2),

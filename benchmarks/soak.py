@@ -9,6 +9,7 @@ logged before tracemalloc began give way to counted ones.
 import argparse
 import gc
 import logging
+import os
 import random
 import threading
 import time
@@ -43,10 +44,23 @@ class Look:
 
 def resident_kb() -> float:
     """Return the resident set in kB; 0 outside Linux."""
-    if not _STATUS.exists():
-        return 0.0
-    lines = _STATUS.read_text(encoding="utf-8").splitlines()
-    return next(float(line.split()[1]) for line in lines if line.startswith("VmRSS:"))
+    return _status(_STATUS).get("VmRSS", 0.0)
+
+
+def helpers_kb() -> list[float]:
+    """Return the resident set of each process that this one has started, kB; none outside Linux."""
+    found = [_status(each) for each in Path("/proc").glob("[0-9]*/status")]
+    return [each.get("VmRSS", 0.0) for each in found if each.get("PPid") == os.getpid()]
+
+
+def _status(file: Path) -> dict[str, float]:
+    """Return the numbers that stand in a file of the system about a process."""
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except OSError:  # it has just ended, or this is no Linux
+        return {}
+    words = [line.replace(":", " ").split() for line in lines]
+    return {each[0]: float(each[1]) for each in words if len(each) > 1 and each[1].isdecimal()}
 
 
 def thread_count() -> int:

@@ -24,6 +24,8 @@ _Numbers = npt.NDArray[np.intp]
 _ACROSS: Final = 1e-6
 """A joint that moves less than this along a direction does not move along it."""
 _BEYOND_UM: Final = 0.01
+_MOST_CONCERNS: Final = 32
+"""So many sets of moving joints are remembered; eleven axes have 2048, of 200 to 500 kB each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +182,8 @@ class Sweep:
             concern = _Concern(
                 rows, self._first[rows], self._second[rows], self._margin[rows], steady
             )
+            if len(self._concerns) >= _MOST_CONCERNS:
+                del self._concerns[next(iter(self._concerns))]
             self._concerns[key] = concern
         return concern
 
