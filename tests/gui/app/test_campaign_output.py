@@ -1,5 +1,7 @@
 """The report of a campaign on paper."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,10 +9,11 @@ from PySide6.QtPdf import QPdfDocument
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.campaign.output import write_pdf
+from cosmic.autonomy.bending.result import Contribution, Kind, Quality
 from cosmic.autonomy.campaign.records import CampaignError
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
-from unit.autonomy.campaign.sample_records import INFO, failed, good
+from unit.autonomy.campaign.sample_records import INFO, failed, good, image
 
 
 def test_a_campaign_is_printed_with_its_figures(tmp_path: Path, qtbot: QtBot) -> None:
@@ -40,6 +43,37 @@ def test_no_page_ends_with_a_heading(tmp_path: Path, qtbot: QtBot) -> None:
     ]
     assert len(last) > 4
     assert not headings.intersection(last)
+
+
+BUDGET = tuple(
+    Contribution(f"source {number}", Kind.B, 0.1, "", 0.3, share=0.08 if number < 12 else 0.01 / 4)
+    for number in range(16)
+)
+
+
+def test_each_fibre_has_one_page_with_two_images_and_its_whole_budget(
+    tmp_path: Path, qtbot: QtBot
+) -> None:
+    with CampaignStore.create(tmp_path / "run", INFO) as store:
+        for number in range(1, 4):
+            fibre = good(store.begin_fibre(time_s=0.0), seed=number)
+            images = (image(number, (960, 1280)), image(number + 1, (960, 1280)))
+            assert fibre.bending is not None
+            bending = replace(
+                fibre.bending,
+                spans=(*fibre.bending.spans, *fibre.bending.spans)[:5],
+                budget=BUDGET,
+                notes=frozenset({Quality.FRICTION}),
+            )
+            store.finish_fibre(replace(fibre, images=images, bending=bending))
+        write_pdf(store, tmp_path / "report.pdf")
+    document = QPdfDocument()
+    document.load(str(tmp_path / "report.pdf"))
+    texts = [document.getAllText(page).text().strip() for page in range(document.pageCount())]
+    begin = [page for page, text in enumerate(texts) if re.search(r"^Fibre \d+: ", text, re.M)]
+    assert len(begin) == 3
+    assert begin == list(range(begin[0], begin[0] + 3))
+    assert all("all others" in texts[page] for page in begin)
 
 
 def test_a_path_that_cannot_be_written_is_reported(tmp_path: Path, qtbot: QtBot) -> None:

@@ -408,6 +408,8 @@ def _record_rows(data: ReportData) -> list[tuple[str, str]]:
     ]
     named = [f"{key} {value}" for key, value in sensor.items() if value]
     software = last.get("software", {})
+    commit = str(software.get("commit") or "unknown")
+    again = commit == data.info.versions.get("commit")  # it stands there already
     analysis = data.analysis.get("versions", {})
     return [
         ("Runs", str(len(data.runs))),
@@ -417,7 +419,7 @@ def _record_rows(data: ReportData) -> list[tuple[str, str]]:
         ),
         ("Climate", ", ".join(air) or "not read"),
         ("Force sensor", ", ".join(named) or "not named"),
-        ("Commit", str(software.get("commit") or "unknown")),
+        *([] if again else [("Commit of the last run", commit)]),
         ("System", str(software.get("system", NONE))),
         (
             "Packages",

@@ -244,10 +244,12 @@ QPushButton[watched="false"], QPushButton[watched="false"]:hover {
 
 PRINTED: Final = """
 body { font-family: sans-serif; font-size: 11px; color: #202428; }
-h1 { font-size: 20px; } h2 { font-size: 15px; margin-bottom: 7px; }
+h1 { font-size: 20px; } h2 { font-size: 15px; margin-top: 14px; margin-bottom: 7px; }
 h3 { font-size: 13px; margin-top: 14px; }
 h3.long { page-break-before: always; }
+table { margin-top: 4px; margin-bottom: 4px; }
 th { background-color: #eef1f4; font-size: 11px; } td { font-size: 11px; }
+td, th { padding-left: 4px; padding-right: 4px; }
 pre { background-color: #f3f5f7; font-size: 10px; } small { font-size: 9px; }
 """
 """Of a printed report: black on white in every theme."""

@@ -44,14 +44,17 @@ from cosmic.frame.gui.stylesheet import PRINTED
 FINE: Final = 3
 """Pixels of a drawn figure for one of the page."""
 
-FIGURE_PX: Final = 330
-"""Widest of two beside each other."""
+FIGURE_PX: Final = 300
+"""Widest of two beside each other, so that a fibre has room on one page."""
+
+WIDE_PX: Final = 430
+"""What is wider stands alone."""
 
 MOST_BREAKS: Final = 20
 """Headings that are put on the next page; more would take long to lay out."""
 
 IMAGE_PX: Final = 216
-"""Widest image of a fibre: three figures stand beside each other."""
+"""Widest image of a fibre: two stand beside each other."""
 
 NUMBER_PX: Final = 10
 MARGINS_MM: Final = (15.0, 15.0, 15.0, 15.0)
@@ -70,7 +73,7 @@ class _Figures:
     def svg(self, svg: str, width_px: int) -> str:
         drawing = QSvgRenderer(QByteArray(svg.encode()))
         size = drawing.defaultSize()
-        width_px = width_px if width_px > FIGURE_PX + 100 else min(width_px, FIGURE_PX)
+        width_px = width_px if width_px > WIDE_PX else min(width_px, FIGURE_PX)
         height_px = round(width_px * size.height() / size.width())
         image = QImage(FINE * width_px, FINE * height_px, QImage.Format.Format_RGB32)
         image.fill(0xFFFFFFFF)
