@@ -45,7 +45,7 @@ class CentralView(QWidget):
         self, cameras: dict[str, CameraView], scene: ScenePanel, parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
-        self.setObjectName("stage")
+        self.setObjectName("centralView")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.setMinimumSize(30 * STEP_PX, 20 * STEP_PX)

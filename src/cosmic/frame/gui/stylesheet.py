@@ -191,7 +191,7 @@ QProgressBar[look="bar"] { min-height: 8px; border: none; }
 #drawerLine QToolButton:hover, #drawerLine QToolButton:focus { color: $text; background: $hover; }
 #drawerLine QToolButton:checked { color: $text; border-top: 2px solid $accent; }
 #drawerBody { background: $panel; border-top: 2px solid $accent; }
-#stage { background: $field; }
+#centralView { background: $field; }
 #stageInset { background: $panel; border: 1px solid $border_strong; }
 #coach { background: $raised; border: 1px solid $border; border-radius: 4px; }
 #operationCard { background: $raised; border: 1px solid $border_strong; border-radius: 4px; }
