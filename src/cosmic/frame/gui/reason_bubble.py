@@ -7,7 +7,6 @@ from shiboken6 import isValid
 
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override
-from cosmic.frame.units import with_micro_signs
 
 _WIDTH_PX = 45 * STEP_PX
 _FOLLOWED = {QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show, QEvent.Type.Hide}
@@ -40,7 +39,7 @@ class ReasonBubble(QLabel):
     def show_for(self, field: QWidget, reason: str) -> None:
         """Say `reason` below `field` until another refusal, a click or `dismiss`."""
         self.dismiss()
-        self.setText(with_micro_signs(reason))
+        self.setText(reason)
         self.ensurePolished()  # the style sheet adds to the height
         text_width = self.fontMetrics().horizontalAdvance(reason) + 4 * STEP_PX
         width = min(_WIDTH_PX, text_width, field.window().width())
