@@ -16,6 +16,7 @@ A contact of jaw and plate counts as not intended where it is deeper than the wo
 
 import argparse
 import math
+import os
 import random
 import shutil
 import statistics
@@ -84,6 +85,7 @@ class Scored:
 
     run: Run
     wall_s: float
+    cpu_s: float
 
     @property
     def alone(self) -> int:
@@ -172,14 +174,20 @@ def carry_out(world: str, seed: int, stop: str, folder: Path, *, procedure: str)
     command = [sys.executable, "-m", "cosmic", "campaign", str(recipe), "--config", str(config)]
     command += ["--out", str(out), "--world", name]
     command += ["--seed", str(seed), "--rate", str(RATE), "--truth", str(truth)]
-    began_s = time.monotonic()
+    began_s, before_s = time.monotonic(), _children_s()
     done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, check=False)
     _, end = CampaignReader(out).ended() if out.exists() else ("", "")
     if not end:
         raise RuntimeError(f"{world}, seed {seed}: {done.stderr[-2000:]}")
     reader = CampaignReader(out)
     run = Run(reader.fibres(), reader.elapsed_s(), read_truth(truth), end)
-    return Scored(run, time.monotonic() - began_s)
+    return Scored(run, time.monotonic() - began_s, _children_s() - before_s)
+
+
+def _children_s() -> float:
+    """Return the processor time of all programs that have ended, with what they started."""
+    used = os.times()
+    return used.children_user + used.children_system
 
 
 def figures_of(world: str, scored: Sequence[Scored]) -> list[Figure]:
@@ -200,6 +208,7 @@ def figures_of(world: str, scored: Sequence[Scored]) -> list[Figure]:
     rate = statistics.mean(rates)
     elapsed_s = sum(each.run.elapsed_s for each in scored)
     wall_s = 3600.0 * sum(each.wall_s for each in scored) / max(elapsed_s, 1.0)
+    cpu_s = 3600.0 * sum(each.cpu_s for each in scored) / max(elapsed_s, 1.0)
 
     def figure(name: str, value: float, unit: str, limit: float | None = None) -> Figure:
         return Figure(NAME, f"{world}: {name}", value, unit, limit)
@@ -220,6 +229,7 @@ def figures_of(world: str, scored: Sequence[Scored]) -> list[Figure]:
         figure(f"deeper than {allowed:g} um", sum(each > allowed for each in depths), "", 0.0),
         figure("other contacts that were not intended", sum(e.other_contacts for e in scored), ""),
         figure("wall a platform hour", wall_s / 60.0, "min", 5.0),
+        figure("processor a platform hour", cpu_s / 60.0, "min"),
     ]
 
 

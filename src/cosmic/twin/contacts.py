@@ -85,8 +85,8 @@ class Contacts:
             and self._lowest[number, 2] < self._top_um()
         ]
         self._looked_at = np.full_like(self._origins, math.inf)
-        self._looked_with: list[float] = []
-        self._looked_s = 0.0
+        self._placed_with: list[float] = []
+        self._placed_s = self._nearer_um = 0.0
         self._slack_um = 0.0
         self._faces: dict[tuple[int, int], Faces] = {}
         self._now: dict[tuple[str, str], float] = {}
@@ -105,13 +105,13 @@ class Contacts:
             for tool, numbers in self._of_tool.items():
                 positions[numbers] += offsets.at(tool, time_s)
         gone = 2.0 * float(np.abs(positions - self._looked_at).max())
+        bent = offsets.fastest_um_s is None
+        self._placed_with = [] if bent else [values[name] for name in self._stages]
+        self._placed_s, self._nearer_um = time_s, gone
         if self._slack_um > gone or (self._by_design is not None and time_s < self._next_s):
             return max(self._slack_um - gone, FINEST_UM)
         self._next_s = time_s + CHECK_S
-        self._looked_at = positions
-        bent = offsets.fastest_um_s is None
-        self._looked_with = [] if bent else [values[name] for name in self._stages]
-        self._looked_s = time_s
+        self._looked_at, self._nearer_um = positions, 0.0
         depths = self._depths(values, positions)
         if self._by_design is None:
             self._by_design = frozenset(depths)
@@ -134,12 +134,13 @@ class Contacts:
         each body.
         """
         drifts_um_s = offsets.fastest_um_s
-        if drifts_um_s is None or not self._looked_with:
+        if drifts_um_s is None or not self._placed_with:
             return None
         gone = 0.0
-        for name, before in zip(self._stages, self._looked_with, strict=True):
+        for name, before in zip(self._stages, self._placed_with, strict=True):
             gone += abs(values[name] - before)
-        return 2.0 * (self._steepest * gone + drifts_um_s * (time_s - self._looked_s))
+        since = self._steepest * gone + drifts_um_s * (time_s - self._placed_s)
+        return self._nearer_um + 2.0 * since
 
     def finish(self) -> None:
         """Tell of contacts that still last."""

@@ -2,7 +2,7 @@
 
 import math
 import random
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -26,7 +26,16 @@ from cosmic.twin.rod import (
     held_at_both_ends,
     tension_un,
 )
-from cosmic.twin.rubbing import Askew, HeldPush, Lifting, Push, RubbedPush, Rubbing
+from cosmic.twin.rubbing import (
+    Askew,
+    HeldPush,
+    Lifting,
+    Push,
+    RubbedPush,
+    Rubbing,
+    held_un,
+    rubbed_un,
+)
 from cosmic.twin.section import Section
 from cosmic.twin.tools import Tool
 
@@ -179,6 +188,7 @@ class Fibre:
         self._solved: _Solved | None = None
         self._curves: _Curves | None = None
         self._inelastic: Inelastic | None = None
+        self._clamped: tuple[tuple[float, float], float] | None = None
         energy = handling.adhesion_un * math.exp(
             handling.adhesion_sigma_ln * random.Random(f"adhesion {self.key}").gauss(0.0, 1.0)
         )
@@ -317,10 +327,17 @@ class Fibre:
         moment = abs(force_un) * self._arm_um(abscissa_um)
         stiffness = self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2
         if not self._section.even:
-            across, _, _ = self._section.flexibility(np.array([hold.at_um]), hold.fate.roll_rad)
-            stiffness /= float(across[0])
+            stiffness /= self._across_at_clamp(hold)
         thick = self._section.thickness_um(hold.at_um, hold.fate.roll_rad)
         return 0.5 * thick * moment / stiffness
+
+    def _across_at_clamp(self, hold: Hold) -> float:
+        """Return by how much more it gives way where it leaves the jaws."""
+        key = hold.at_um, hold.fate.roll_rad
+        if self._clamped is None or self._clamped[0] != key:
+            across, _, _ = self._section.flexibility(np.array([key[0]]), key[1])
+            self._clamped = key, float(across[0])
+        return self._clamped[1]
 
     def back_um(self, abscissa_um: float) -> float:
         """Return how far it stands back there by what crept or set."""
@@ -415,7 +432,7 @@ class Fibre:
             found = self._held_at_one_end(hold, line.free, abscissa_um, probe, time_s)
             if found.askew is not None:
                 self._lifting.follow(
-                    lambda travel_um, held: found.push(part, held).force_un(travel_um),
+                    lambda travel_um: found.forces_un(part, travel_um),
                     travel_um,
                     back_um,
                     height_um,
@@ -554,6 +571,22 @@ class _Curves:
     place_um: float
     curves: tuple[tuple[PushCurve, ...], ...]
     askew: Askew | None
+
+    def forces_un(self, part: float, travel_um: float) -> Callable[[float], float]:
+        """Return the force at a travel as it depends on the part of the force up.
+
+        It is asked again and again at one travel, where the curves have one value each.
+        """
+        most = 1.0 if self.askew is None else self.askew.most
+        pairs = [
+            (each[0].force_un(travel_um), each[-1].force_un(travel_um)) for each in self.curves
+        ]
+
+        def force_un(held: float) -> float:
+            across = [held_un(down, up, held / most) for down, up in pairs]
+            return across[0] if len(across) == 1 else rubbed_un(across[0], across[1], part)
+
+        return force_un
 
     def push(self, part: float, held: float) -> PushCurve | Push:
         """Return the push for friction along the fibre, -1 to 1, and a part of the force up."""

@@ -123,9 +123,10 @@ class ForceSensor:
             warmer_k = self._climate.warmer_at_k(times_s)
             gain = gain * (1.0 + self._gain_k * warmer_k)
             felt += self._zero_un_k * warmer_k
-            felt += self._warm_up_un * np.exp(-times_s / self.settings.warm_up_s)
+            if self._warm_up_un:
+                felt += self._warm_up_un * np.exp(-times_s / self.settings.warm_up_s)
         out = self.true_zero_v + gain * felt
-        return np.clip(out, self.settings.zero_v - half_v, self.settings.zero_v + half_v)
+        return out.clip(self.settings.zero_v - half_v, self.settings.zero_v + half_v)
 
     def _steps_s(self, times_s: Floats) -> Floats:
         """Return how much time passed before each sample; for ever before the very first."""
@@ -145,24 +146,28 @@ class ForceSensor:
         per_s = 2.0 * math.pi * self.settings.bandwidth_hz
         decay = np.minimum(steps_s * per_s, LONGEST_RUN)
         kept = np.exp(-decay)
-        noise = self.settings.noise_un * self._noise.standard_normal(force_un.size)
-        return self._recur(decay, (1.0 - kept) * force_un + np.sqrt(1.0 - kept * kept) * noise)
+        drive = self._noise.standard_normal(force_un.size)
+        drive *= self.settings.noise_un
+        drive *= np.sqrt(1.0 - kept * kept)
+        drive += (1.0 - kept) * force_un
+        return self._recur(decay, drive)
 
     def _recur(self, decay: Floats, drive: Floats) -> Floats:
         """Return x[k] = exp(-decay[k]) x[k-1] + drive[k], in runs that a float can hold."""
-        age = np.cumsum(decay)
+        age = decay.cumsum()
         out = np.empty_like(drive)
         start = 0
         while start < drive.size:
-            base = age[start]
+            base = float(age[start])
             # The first of a run may follow any pause: it is taken on its own.
             first = math.exp(-decay[start]) * self._state_un + float(drive[start])
-            end = int(np.searchsorted(age, base + LONGEST_RUN, side="right"))
-            end = max(end, start + 1)
+            end = drive.size
+            if age[-1] > base + LONGEST_RUN:
+                end = max(int(age.searchsorted(base + LONGEST_RUN, side="right")), start + 1)
             growth = np.exp(age[start:end] - base)
             grown = drive[start:end] * growth
             grown[0] = first
-            out[start:end] = np.cumsum(grown) / growth
+            out[start:end] = grown.cumsum() / growth
             self._state_un = float(out[end - 1])
             start = end
         return out
@@ -175,6 +180,6 @@ class ForceSensor:
         steps *= self._drift.standard_normal(steps.size)
         if self.running_un_s:
             steps += self.running_un_s * steps_s
-        walk = self._walk_un + np.cumsum(steps)
+        walk = self._walk_un + steps.cumsum()
         self._walk_un = float(walk[-1])
         return np.asarray(walk)

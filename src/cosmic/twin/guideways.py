@@ -32,8 +32,12 @@ class Guideways:
                 self._yaw[name] = across, 0.5 * side * kind.yaw_um, rate, math.pi * phase
             if kind.reversal or kind.lag_part:
                 self._loose[name] = 0.5 * kind.reversal, kind.lag_part, kind.lag_s
+        self._lag_times_s = {lag_s for _, part, lag_s in self._loose.values() if part}
         self._play: dict[str, float] = {}
-        self._lag: dict[str, tuple[float, float]] = {}
+        self._lag: dict[str, float] = {}
+        self._lagging = 0.0
+        self._before: dict[str, float] = {}
+        self._played: dict[str, float] = {}
         self._time_s = 0.0
 
     @property
@@ -57,28 +61,40 @@ class Guideways:
 
         Times rise from call to call.
         """
-        found = self.led(values)
         passed_s, self._time_s = time_s - self._time_s, time_s
-        for name, (half, part, lag_s) in self._loose.items():
+        kept = {lag_s: math.exp(-passed_s / lag_s) for lag_s in self._lag_times_s}
+        if values != self._before:
+            self._move(values)
+        found = dict(self._played)
+        lagging = 0.0
+        for name, before in self._lag.items():
+            lag = before * kept[self._loose[name][2]]
+            self._lag[name] = lag
+            found[name] -= lag
+            lagging = max(lagging, abs(lag))
+        self._lagging = lagging
+        return found
+
+    def _move(self, values: Mapping[str, float]) -> None:
+        """Take note that stages are led elsewhere: what has play stays behind, the rest lags."""
+        before, self._before = self._before, dict(values)
+        self._played = self.led(values)
+        for name, (half, part, _) in self._loose.items():
             if name not in values:
                 continue
             at = values[name]
             if half:
                 play = min(max(self._play.get(name, at), at - half), at + half)
                 self._play[name] = play
-                found[name] += play - at
-            if part:
-                before, lag = self._lag.get(name, (at, 0.0))
-                lag = (lag + part * (at - before)) * math.exp(-passed_s / lag_s)
-                self._lag[name] = at, lag
-                found[name] -= lag
-        return found
+                self._played[name] += play - at
+            moved = part * (at - before.get(name, at))
+            if moved:
+                self._lag[name] = self._lag.get(name, 0.0) + moved
 
     @property
     def restless_s(self) -> float:
         """For how long nothing creeps that could be felt."""
-        largest = max((abs(lag) for _, lag in self._lag.values()), default=0.0)
-        return 0.05 if largest > 0.01 else math.inf
+        return 0.05 if self._lagging > 0.01 else math.inf
 
 
 def _across(name: str) -> str:

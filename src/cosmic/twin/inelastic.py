@@ -53,11 +53,12 @@ class Inelastic:
         self._time_s = 0.0
         self._loaded_s = 0.0
         self._force_un = 0.0
+        self._arm_um, self._levers = 0.0, np.zeros(CELLS)
 
     def offset_um(self, arm_um: float) -> float:
         """Return how far the fibre stands back, at so far from the clamp."""
-        arms = np.maximum(arm_um - self._at_um, 0.0) * self._cell_um
-        return float(arms @ (self._slope * self._creeping.sum(axis=0) + self._set))
+        arms = self._levers_um(arm_um) * self._cell_um
+        return float(self._slope * (self._creeping @ arms).sum() + self._set @ arms)
 
     def follow(self, time_s: float, force_un: float, arm_um: float, ei_un_um2: float) -> None:
         """Take note of the force there from now on; times rise."""
@@ -67,12 +68,18 @@ class Inelastic:
         if abs(force_un - self._force_un) > 1e-3 * abs(self._force_un) + 1e-3:
             self._loaded_s = time_s
         self._force_un = force_un
-        self._before = np.maximum(arm_um - self._at_um, 0.0) * (force_un / ei_un_um2)
-        part = np.minimum(np.abs(self._before) / self._yield, FULLEST)
-        if part[0] > 1.0:
+        self._before = self._levers_um(arm_um) * (force_un / ei_un_um2)
+        if abs(float(self._before[0])) > self._yield:  # no cell bends more than that at the clamp
+            part = np.minimum(np.abs(self._before) / self._yield, FULLEST)
             beyond = np.where(part > 1.0, 1.0 / np.sqrt(3.0 - 2.0 * part) - part, 0.0)
             grown = np.maximum(np.abs(self._set), self._yield * beyond)
             self._set = np.where(beyond > 0.0, np.copysign(grown, self._before), self._set)
+
+    def _levers_um(self, arm_um: float) -> Floats:
+        """Return how far each cell is from a force so far from the clamp; asked for often."""
+        if arm_um != self._arm_um:
+            self._arm_um, self._levers = arm_um, np.maximum(arm_um - self._at_um, 0.0)
+        return self._levers
 
     @property
     def restless_s(self) -> float:

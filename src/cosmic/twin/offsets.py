@@ -50,6 +50,10 @@ class ToolOffsets:
                 amplitude = direction[0] * size, direction[1] * size, direction[2] * size
                 self._drift[name] = amplitude, 2.0 * math.pi / period_s, phase
         self.tools = tuple(tools)
+        drifts = self._drift.values()
+        self._fastest_um_s = max(
+            (math.hypot(*drift) * rate for drift, rate, _ in drifts), default=0.0
+        )
 
     @property
     def still(self) -> bool:
@@ -59,10 +63,7 @@ class ToolOffsets:
     @property
     def fastest_um_s(self) -> float | None:
         """How fast a tool drifts at most; None while a tip is bent."""
-        if self._bent:
-            return None
-        drifts = self._drift.values()
-        return max((math.hypot(*drift) * rate for drift, rate, _ in drifts), default=0.0)
+        return None if self._bent else self._fastest_um_s
 
     def bend(self, tool: str, offset_um: Point) -> None:
         """Have the tip of a tool bent by so much; zeros end it."""

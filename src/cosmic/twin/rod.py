@@ -73,6 +73,10 @@ class PushCurve:
         """Return the force along the fibre on the probe, outwards."""
         return self._at(self.alongs_un, travel_um) if self.alongs_un else 0.0
 
+    def both_un(self, travel_um: float) -> tuple[float, float]:
+        """Return the force across and the force along, as a look needs both."""
+        return self.force_un(travel_um), self.along_un(travel_um)
+
     def _at(self, forces: list[float], travel_um: float) -> float:
         travels, pushed_um = self.travels_um, abs(travel_um)
         if pushed_um >= self.reach_um:

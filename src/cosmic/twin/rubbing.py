@@ -79,7 +79,7 @@ class Lifting:
 
     def follow(
         self,
-        force_un: Callable[[float, float], float],
+        forces_un: Callable[[float], Callable[[float], float]],
         travel_um: float,
         back_um: float,
         height_um: float,
@@ -89,8 +89,8 @@ class Lifting:
 
         Parameters
         ----------
-        force_un : callable
-            Force across for a travel and a `part`.
+        forces_un : callable
+            Makes of a travel the force across there for each `part`.
         back_um : float
             How far the fibre stands back by what crept: that alone moves no contact.
         height_um : float
@@ -102,11 +102,12 @@ class Lifting:
         if travel_um <= 0.0:
             self.part = 0.0
             return 0.0
-        before = max(force_un(crept_um, self.part), 0.0)
+        before = max(forces_un(crept_um)(self.part), 0.0)
         held = self.part * before
         part = self.part
+        force_un = forces_un(travel_um)
         for _ in range(ROUNDS):
-            now = force_un(travel_um, part)
+            now = force_un(part)
             up = held + askew.ratio * (now - before) + rose_um / askew.up_um_un
             part = min(max(up / max(now, LEAST_UN), -askew.most), askew.most)
         self.part = part
@@ -128,6 +129,22 @@ class Push(Protocol):
     @abstractmethod
     def along_un(self, travel_um: float) -> float:
         """Return the force along the fibre on the probe at a travel, outwards."""
+
+    @abstractmethod
+    def both_un(self, travel_um: float) -> tuple[float, float]:
+        """Return both forces at a travel; each curve is asked once."""
+
+
+def held_un(down_un: float, up_un: float, part: float) -> float:
+    """Return the force between those of all friction down and up: what it gives way follows."""
+    if not down_un * up_un > 0.0:
+        return 0.0
+    return 2.0 / ((1.0 + part) / down_un + (1.0 - part) / up_un)
+
+
+def rubbed_un(growing_un: float, falling_un: float, part: float) -> float:
+    """Return the force between those of a growing and of a falling push."""
+    return 0.5 * (growing_un + falling_un) + 0.5 * part * (growing_un - falling_un)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,15 +168,17 @@ class HeldPush(Push):
 
     @override
     def force_un(self, travel_um: float) -> float:
-        one, other = self.down.force_un(travel_um), self.up.force_un(travel_um)
-        if not one * other > 0.0:
-            return 0.0
-        return 2.0 / ((1.0 + self.part) / one + (1.0 - self.part) / other)
+        return held_un(self.down.force_un(travel_um), self.up.force_un(travel_um), self.part)
 
     @override
     def along_un(self, travel_um: float) -> float:
-        one = self.down.force_un(travel_um)
-        return self.force_un(travel_um) * self.down.along_un(travel_um) / one if one else 0.0
+        return self.both_un(travel_um)[1]
+
+    @override
+    def both_un(self, travel_um: float) -> tuple[float, float]:
+        one, along = self.down.both_un(travel_um)
+        across = held_un(one, self.up.force_un(travel_um), self.part)
+        return across, across * along / one if one else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,10 +196,14 @@ class RubbedPush(Push):
 
     @override
     def force_un(self, travel_um: float) -> float:
-        one, other = self.growing.force_un(travel_um), self.falling.force_un(travel_um)
-        return 0.5 * (one + other) + 0.5 * self.part * (one - other)
+        return self.both_un(travel_um)[0]
 
     @override
     def along_un(self, travel_um: float) -> float:
-        one, other = self.growing.along_un(travel_um), self.falling.along_un(travel_um)
-        return 0.5 * (one + other) + 0.5 * self.part * (one - other)
+        return self.both_un(travel_um)[1]
+
+    @override
+    def both_un(self, travel_um: float) -> tuple[float, float]:
+        one, along_one = self.growing.both_un(travel_um)
+        other, along_other = self.falling.both_un(travel_um)
+        return rubbed_un(one, other, self.part), rubbed_un(along_one, along_other, self.part)

@@ -90,6 +90,11 @@ class Section:
         turn = self._settings.orientation_deg + 1e-3 * self._settings.twist_deg_mm * along_um
         return np.asarray(np.radians(turn) + roll_rad)
 
+    def _angle_at_rad(self, at_um: float, roll_rad: float) -> float:
+        """Return the same at one place, as each look asks: an array is not worth its call."""
+        each = self._settings
+        return math.radians(each.orientation_deg + 1e-3 * each.twist_deg_mm * at_um) + roll_rad
+
     def flexibility(self, along_um: Floats, roll_rad: float) -> tuple[Floats, Floats, Floats]:
         """Return across, askew and up by how much it gives way more than an even flat one.
 
@@ -117,7 +122,7 @@ class Section:
         width, thick = self._settings.width_um, self._settings.thickness_um
         if self._settings.plane_ratio <= 1.0:
             return thick
-        angle = float(self.angle_rad(np.array(at_um), roll_rad))
+        angle = self._angle_at_rad(at_um, roll_rad)
         return math.hypot(thick * math.cos(angle), width * math.sin(angle))
 
     def seen_um(self, at_um: float, roll_rad: float) -> float:
@@ -125,7 +130,7 @@ class Section:
         width, thick = self._settings.width_um, self._settings.thickness_um
         if self._settings.plane_ratio <= 1.0:
             return width
-        angle = float(self.angle_rad(np.array(at_um), roll_rad))
+        angle = self._angle_at_rad(at_um, roll_rad)
         return math.hypot(width * math.sin(angle), thick * math.cos(angle))
 
     def shear_um_un(self, length_um: float, thickness_um: float, ei_un_um2: float) -> float:

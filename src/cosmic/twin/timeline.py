@@ -40,6 +40,11 @@ class Track:
 
     Whoever plans a movement only puts it down here; the rest is called with the timeline's lock
     held.
+
+    Attributes
+    ----------
+    rests : bool
+        It is where `position` had it last, but for creep, until it is planned to move.
     """
 
     def __init__(self, stage: Stage) -> None:
@@ -47,6 +52,7 @@ class Track:
         self._new: deque[Path] = deque()
         self._paths: list[Path] = [stage.path]
         self._current = 0
+        self.rests = False
         stage.planned = self._new.append
 
     @property
@@ -58,6 +64,7 @@ class Track:
         """Learn of the movements planned so far; what one of them replaced is forgotten."""
         if not self._new:
             return
+        self.rests = False
         paths = self._paths
         del paths[: self._current]
         self._current = 0
@@ -79,7 +86,9 @@ class Track:
     def position(self, time_s: float) -> float:
         """Return where the stage is at `time_s`, which never falls."""
         low, high = self.stage.bounds
-        return min(max(self.path(time_s).at(time_s), low), high)
+        path = self.path(time_s)
+        self.rests = path.end_s <= time_s and self._current + 1 == len(self._paths)
+        return min(max(path.at(time_s), low), high)
 
     def leg(self, time_s: float) -> tuple[float, float]:
         """Return its speed at `time_s` without sign, and until when it stays so."""
@@ -118,7 +127,6 @@ class Timeline:
         self._lock = Lock()
         self._felt = Felt()
         self._values: dict[str, float] = {}
-        self._resting: dict[str, Path] = {}
         self._creep_from_s = 0.0
         self._at = -1
         self._times_s: deque[float] = deque(maxlen=KEPT)
@@ -216,15 +224,12 @@ class Timeline:
     def _look(self, number: int) -> None:
         self._at = number
         time_s = number * self._step_s
-        if time_s >= self._creep_from_s:
-            self._resting.clear()
+        creeps = time_s >= self._creep_from_s
+        if creeps:
             self._creep_from_s = time_s + LONGEST_REST_S
         for track in self._tracks:
-            path, name = track.path(time_s), track.stage.name
-            if self._resting.get(name) is not path:
-                self._encoders[name] = track.position(time_s)
-                if path.end_s <= time_s:
-                    self._resting[name] = path
+            if creeps or not track.rests:
+                self._encoders[track.stage.name] = track.position(time_s)
         self._values = self._encoders
         if not self._guideways.true:
             self._values = self._guideways.follow(self._encoders, time_s)
@@ -245,6 +250,8 @@ class Timeline:
         travel = max(LONGEST_TRAVEL, SLACK_PART * felt.slack_um)
         gap = max(LONGEST_TRAVEL, SLACK_PART * min(felt.slack_um, felt.gap_um))
         for track in self._tracks:
+            if track.rests:
+                continue
             speed, end_s = track.leg(now_s)
             if speed > 0.0:
                 at_rest = False

@@ -69,9 +69,10 @@ class Flicker:
         rates = SLOWEST_HZ * 10.0 ** (np.arange(decades) + 0.5)
         self._kept = np.exp(-2.0 * math.pi * rates * TICK_S)
         self._sigma = np.full(decades, math.sqrt(density_un2_hz * corner_hz * math.log(10.0)))
+        self._fresh = self._sigma * np.sqrt(1.0 - self._kept * self._kept)
         self._state = self._sigma * chance.standard_normal(decades)
         self._tick = 0
-        self._ticks: list[int] = [0]
+        self._times_s: list[float] = [0.0]
         self._values: list[float] = [float(self._state.sum())]
 
     def at(self, times_s: Floats) -> Floats:
@@ -79,16 +80,22 @@ class Flicker:
         last = math.floor(float(times_s[-1]) / TICK_S) + 1
         first = math.floor(float(times_s[0]) / TICK_S) - 1
         if first - self._tick > LONGEST_TICKS:
-            self._step(first, self._kept ** (first - self._tick))
-        while self._tick < last:
-            self._step(self._tick + 1, self._kept)
-        while len(self._ticks) > 2 and self._ticks[1] < first:
-            del self._ticks[0], self._values[0]
-        return np.asarray(np.interp(times_s, TICK_S * np.array(self._ticks), self._values))
+            kept = self._kept ** (first - self._tick)
+            self._steps(first, kept, self._sigma * np.sqrt(1.0 - kept * kept), 1)
+        if self._tick < last:
+            self._steps(self._tick + 1, self._kept, self._fresh, last - self._tick)
+        past = 0
+        while past + 2 < len(self._times_s) and self._times_s[past + 1] < TICK_S * first:
+            past += 1
+        del self._times_s[:past], self._values[:past]
+        return np.asarray(np.interp(times_s, self._times_s, self._values))
 
-    def _step(self, tick: int, kept: Floats) -> None:
-        fresh = self._chance.standard_normal(len(kept))
-        self._state = kept * self._state + self._sigma * np.sqrt(1.0 - kept * kept) * fresh
-        self._tick = tick
-        self._ticks.append(tick)
-        self._values.append(float(self._state.sum()))
+    def _steps(self, tick: int, kept: Floats, fresh: Floats, count: int) -> None:
+        """Walk on to a tick and so many from there; for a few numbers no array is worth it."""
+        drawn = (fresh * self._chance.standard_normal((count, len(kept)))).tolist()
+        state, parts = self._state.tolist(), kept.tolist()
+        for number, each in enumerate(drawn, start=tick):
+            state = [part * was + new for part, was, new in zip(parts, state, each, strict=True)]
+            self._times_s.append(TICK_S * number)
+            self._values.append(math.fsum(state))
+        self._state, self._tick = np.array(state), tick + count - 1

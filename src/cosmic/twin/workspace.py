@@ -280,7 +280,7 @@ class Workspace:
             back_um=back,
             height_um=line.z_um(along) - probe[2],
         )
-        force = curve.force_un(travel)
+        force, along_un = curve.both_un(travel)
         if travel > curve.reach_um:
             touch.lose()
             return None
@@ -294,7 +294,7 @@ class Workspace:
             touch.lose()
             return None
         fibre.follow(self._time_s, force, along)
-        outwards = line.towards * curve.along_un(travel)
+        outwards = line.towards * along_un
         return Push(fibre.number, force, along, deflection, outwards, fibre.up_part * force)
 
     def _bears(self, fibre: Fibre, along: float, force_un: float, around: Around) -> bool:

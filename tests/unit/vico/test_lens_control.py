@@ -112,6 +112,17 @@ def test_movement_is_reported_at_most_twenty_times_a_second(make: Make) -> None:
     assert 3 <= len(received) <= 20.0 * elapsed_s + 3
 
 
+def test_on_a_fast_twin_a_short_seek_takes_no_longer_than_the_motor_needs(make: Make) -> None:
+    bench = make(rate=20.0).start()
+    took_s = []
+    for number in range(5):
+        began_s = bench.clock.now_s()
+        bench.thread.seek(FOCUS, 4080 + 80 * number).wait(5.0)
+        took_s.append(bench.clock.now_s() - began_s)
+    # 0.15 s of the motor and one look; a look of the wall, 0.05 s, would be 1 s here.
+    assert min(took_s) < 0.6
+
+
 def test_a_lens_not_homed_says_so_and_can_be_homed(make: Make) -> None:
     bench = make(cold=True).start()
     refused = failure(bench.thread.seek(ZOOM, 100))

@@ -60,6 +60,7 @@ class HeightsAsFiled(FibreOperation):
 class HeightByFocus(Calibrated):
     """The lens goes through the focus on the plate, on the gripper's tip twice, on the probe's.
 
+    From the plate upwards, for the focus is slow: the tip low, high, and the probe beside that.
     The tip is nowhere near the plate meanwhile: how high it is does not have to be known before.
     What a count of the focus is worth comes from the two heights of the tip.
     """
@@ -83,8 +84,9 @@ class HeightByFocus(Calibrated):
             yield from zoom_to(work, zoom)
             plate = yield from _plate(work, zoom, begun_counts)
             high = work.hold_tip_um
+            yield work.rise(high)
             tips = []
-            for height in (high, LOW_PART * high):
+            for height in (LOW_PART * high, high):  # the focus takes its time: it only goes up
                 tips.append((yield from _gripper(work, zoom, plate[0], height)))
             yield from clear_image(work)
             probe = yield from _probe(work, zoom, plate[0])
@@ -104,7 +106,7 @@ class HeightByFocus(Calibrated):
         probe: Seen,
     ) -> None:
         settings = work.settings.calibration
-        high, low = tips
+        low, high = tips
         counts_um = (high.counts - low.counts) / (high.stage_um - low.stage_um)
         usual = 1.0 / settings.focus_um_count
         if not 0.7 * usual <= counts_um <= 1.4 * usual:

@@ -1,5 +1,6 @@
 """A movement of the lens under way: how far it is, and whether it ended where it should."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
@@ -12,6 +13,9 @@ from cosmic.vico.hw.peripherals import LensAxis, LensState
 
 START_S: Final = 0.7
 """Wall time within which a motor that was told to move has begun."""
+
+REPORT_S: Final = 0.05
+"""Wall time between two reports of how far it is, however often a fast twin is looked at."""
 
 NEAR_COUNTS: Final = 2
 """So near to its target a motor has reached it."""
@@ -40,6 +44,7 @@ class Move:
     dead_man: DeadMan | None = None
     begun_s: float = 0.0
     begun_wall_s: float = 0.0
+    reported_wall_s: float = -math.inf
     first: dict[LensAxis, int] = field(default_factory=dict)
     left: set[LensAxis] = field(default_factory=set)
     over: bool = False
@@ -92,6 +97,10 @@ class Move:
         return state.homed and abs(state.position_counts - target) <= NEAR_COUNTS
 
     def _report(self, axis: LensAxis, start: int, state: LensState) -> None:
+        now_wall_s = WALL.now_s()
+        if self.clock.rate > 1.0 and now_wall_s - self.reported_wall_s < REPORT_S:
+            return
+        self.reported_wall_s = now_wall_s
         target = self.targets[axis]
         travel = (target if target is not None else -state.limit_counts) - start
         part = (state.position_counts - start) / travel if travel else 0.0

@@ -36,6 +36,7 @@ class Lens(LensHandle):
 
     def __init__(self) -> None:
         self.counts, self.zoomed = 4000, 0.58
+        self.gone_counts = 0
 
     @override
     def state(self, axis: Any) -> LensState:
@@ -43,6 +44,7 @@ class Lens(LensHandle):
 
     @override
     def seek_focus(self, target_counts: int) -> Any:
+        self.gone_counts += abs(target_counts - self.counts)
         self.counts = target_counts
         return Moved()
 
@@ -128,6 +130,15 @@ def test_a_tip_that_is_not_where_the_file_has_it_is_found_in_height(up_um: float
     assert entry is not None
     assert entry.values["counts_um"] == pytest.approx(1.0 / UM_COUNT, rel=0.02)
     assert 0.0 < entry.residual < 12.0
+
+
+def test_the_focus_goes_up_from_the_plate_to_the_tips_and_not_to_and_fro() -> None:
+    bench = Bench(up_um=40.0)
+    carried_out(bench)
+    reach = bench.settings.calibration.focus_reach_um / bench.settings.calibration.focus_um_count
+    highest = bench.hold_tip_um / UM_COUNT
+    # Four sweeps, each begun from below with the play taken up, and once the path up to the tips.
+    assert bench.lens.gone_counts < 4.0 * (4.0 * reach + 200.0) + highest
 
 
 def test_grasps_are_made_at_the_height_that_was_found() -> None:
