@@ -1,16 +1,18 @@
 """Is what is certain right, and what is right certain? And the weights of that certainty.
 
-`--fit` draws the population of `fibre_pairs`, finds its fibres and prints the weights for
-`cosmic.vico.core.vision.certainty`. Without it they are checked: on images of `fibre_pairs` that
-were not fitted, on pairs drawn in the other way of `fibre_images`, on JPEG and on fields of twenty.
-`--images FOLDER` counts the certain ones on photographs as well; `--count N` draws N pairs.
+`--fit` draws the populations `FITTED`, finds their fibres and prints the weights as they stand in
+`cosmic.vico.core.vision.certainty`; `--processes 2` does it in two processes, with the same result.
+Without it they are checked: on images of `fibre_pairs` that were not fitted, on pairs drawn in the
+other way of `fibre_images`, on JPEG and on fields of twenty. `--images FOLDER` counts the certain
+ones on photographs as well; `--count N` draws N pairs.
 """
 
 import argparse
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from unittest.mock import patch
@@ -30,8 +32,6 @@ from cosmic.vico.core.vision.refine import Course
 
 NAME = "certainty"
 PAIRS = (Kind.TOUCHING, Kind.OVERLAPPING, Kind.GAP)
-MIX = (Kind.SINGLE,) * 8 + PAIRS * 3 + (Kind.GOES_ON,) * 3
-FITTED = range(3000)
 CHECKED = range(50_000, 52_000)
 LENGTH_PART = 0.03
 OWN = {axial.GAP, axial.DOUBLED, axial.STEP, beyond.GOES_ON, beyond.SOFT, certainty.IMPROBABLE}
@@ -39,6 +39,9 @@ GRIP = 1e-4
 """How strongly weights are kept small in the fit."""
 LEAST_WEIGHT = 0.1
 ROUNDS = 8
+FIRST_WEIGHT, FIRST_LOGIT = 1.5, 8.0
+PART = 50
+"""Images that a process looks at before it takes others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,64 +95,130 @@ def recorded() -> Iterator[list[certainty.Signs]]:
         yield found
 
 
-@dataclass(slots=True, eq=False)
-class Learned:
-    """What a fit learns from: the signs of each case, and whether it is right.
+@dataclass(frozen=True, slots=True, eq=False)
+class Example:
+    """One fibre that was found, to learn from: its signs, and whether it is right.
 
     Attributes
     ----------
-    pulls : list of float
-        Errors of the length of whole fibres without a sign, in standard deviations.
+    pull : float or None
+        Error of the length of a whole fibre without a sign, in standard deviations.
     """
 
-    signs: list[certainty.Signs] = field(default_factory=list)
-    right: list[bool] = field(default_factory=list)
-    pulls: list[float] = field(default_factory=list)
+    signs: certainty.Signs
+    right: bool
+    pull: float | None
 
-    def add(self, one: Drawn) -> None:
-        """Find the fibres on an image, and add them."""
+
+@dataclass(frozen=True, slots=True)
+class Population:
+    """Images that are drawn to learn from.
+
+    Attributes
+    ----------
+    jpeg : bool or None
+        Whether they are compressed; None: one of three.
+    """
+
+    kinds: tuple[Kind, ...]
+    seeds: range
+    jpeg: bool | None = None
+
+    def draw(self, seed: int, *, compare: bool) -> Drawn:
+        """Return one image; two of seven are large."""
+        kind = self.kinds[seed % len(self.kinds)]
+        return draw(kind, seed, jpeg=self.jpeg, large=seed % 7 < 2, compare=compare)
+
+
+FITTED = (
+    Population((Kind.SINGLE,), range(320_000, 322_000)),
+    Population((Kind.SINGLE,), range(320_000, 322_000, 2), jpeg=False),
+    Population(PAIRS, range(300_000, 303_000)),
+    # More JPEG among the pairs than among the single fibres: what is certain on JPEG is to be right
+    # in a thousand, and what compression hides gives no sign.
+    Population(PAIRS, range(330_000, 331_000), jpeg=True),
+    Population((Kind.GOES_ON,), range(335_000, 335_300)),
+)
+"""What the weights are fitted to: nothing of it is checked."""
+
+
+def thinned(signs: certainty.Signs) -> certainty.Signs:
+    """Return signs without the places at which none is above noise."""
+    along = signs.joints.along
+    kept = (along > certainty.NOISE).any(axis=0)
+    kept[0] |= not kept.any()
+    return replace(signs, joints=replace(signs.joints, along=along[:, kept].astype(np.float32)))
+
+
+def examples(population: Population, seeds: Iterable[int]) -> list[Example]:
+    """Return what is found on images of a population, as far as signs decide about it."""
+    found = []
+    for seed in seeds:
+        one = population.draw(seed, compare=False)
         with recorded() as signs:
-            found = drawn_cases(one)
-        for case in found:
-            # What thins and is found whole shows all signs of what it is not.
-            if set(case.fibre.doubts) - OWN or (case.right and one.kind is Kind.GOES_ON):
-                continue
+            on_image = drawn_cases(one)
+        kept = [each for each in on_image if learnable(each, one.kind)]
+        wrongs = one.kind in PAIRS and any(not case.right for case in kept)
+        if wrongs and not tellable(population.draw(seed, compare=True)):
+            continue
+        for case in kept:
             own = next(each for each in signs if each.values == case.fibre.signs)
-            self.signs.append(own)
-            self.right.append(case.right)
+            pull = None
             if case.right and not own.doubts:
                 pull = abs(case.fibre.length_px - case.length_px) / case.fibre.length_std_px
-                self.pulls.append(pull)
+            found.append(Example(thinned(own), case.right, pull))
+    return found
 
 
-def fit(seeds: Iterable[int]) -> tuple[np.ndarray, float, float]:
-    """Return weights and the logit alone, right for each wrong, and how wide an interval is.
+def learnable(case: Case, kind: Kind) -> bool:
+    """Return whether signs decide about what was found.
 
-    A joint is in one place: of each fibre the signs of the place count where together they weigh
-    most. Which that is depends on the weights, so that both are found in turn.
+    Other doubts decide by themselves; what is wrong on an image of one fibre is no joint; what
+    thins and is found whole shows all signs of what it is not.
     """
-    learned = Learned()
-    for seed in seeds:
-        one = draw(MIX[seed % len(MIX)], seed, large=seed % 7 < 2)
-        if tellable(one):
-            learned.add(one)
-    y = np.where(np.array(learned.right), 1.0, -1.0)
-    state = np.append(np.full(len(certainty.NAMES), 2.0), 8.0)
+    if set(case.fibre.doubts) - OWN:
+        return False
+    return not case.right if kind is Kind.GOES_ON else case.right or kind is not Kind.SINGLE
+
+
+def learned(populations: Iterable[Population], processes: int = 1) -> list[Example]:
+    """Return what is found on all images of some populations."""
+    parts = [
+        (each, each.seeds[first : first + PART]) for each in populations
+        for first in range(0, len(each.seeds), PART)
+    ]  # fmt: skip
+    if processes == 1:
+        return [one for part in parts for one in examples(*part)]
+    with ProcessPoolExecutor(processes, initializer=cv2.setNumThreads, initargs=(1,)) as pool:
+        return [one for found in pool.map(examples, *zip(*parts, strict=True)) for one in found]
+
+
+def fit(known: Sequence[Example]) -> np.ndarray:
+    """Return the weights and, last, the logit where there is no sign.
+
+    The right and the wrong ones count as much together, however many they are. A joint is in one
+    place: of each fibre the signs of the place count where together they weigh most. Which that is
+    depends on the weights, so that both are found in turn.
+    """
+    right = np.array([each.right for each in known])
+    y = np.where(right, 1.0, -1.0)
+    share = np.where(right, 0.5 / max(right.mean(), 1e-9), 0.5 / max(1.0 - right.mean(), 1e-9))
+    state = np.append(np.full(len(certainty.NAMES), FIRST_WEIGHT), FIRST_LOGIT)
     for number in range(ROUNDS):
-        x = np.array([each.weighed_by(state[:-1]) for each in learned.signs])
+        x = np.array([each.signs.weighed_by(state[:-1]) for each in known])
 
         def loss(state: np.ndarray, x: np.ndarray = x) -> tuple[float, np.ndarray]:
             logit = state[-1] - x @ state[:-1]
-            miss = 1.0 / (1.0 + np.exp(np.clip(y * logit, -40.0, 40.0)))
-            value = np.logaddexp(0.0, -y * logit).mean() + GRIP * float(state[:-1] @ state[:-1])
+            miss = share / (1.0 + np.exp(np.clip(y * logit, -40.0, 40.0)))
+            small = GRIP * float(state[:-1] @ state[:-1])
+            value = (share * np.logaddexp(0.0, -y * logit)).mean() + small
             slope = (y * miss) @ x / len(y) + 2.0 * GRIP * state[:-1]
             return float(value), np.append(slope, -(y * miss).mean())
 
         bounds = [(LEAST_WEIGHT, None)] * x.shape[1] + [(None, None)]
         best = minimize(loss, state, jac=True, bounds=bounds, method="L-BFGS-B").x
         state = best if number == ROUNDS - 1 else 0.5 * (state + best)
-    odds = float((y > 0).sum() / max(1, (y < 0).sum()))
-    return state, odds, float(np.percentile(learned.pulls, 95))
+    return np.asarray(state)
 
 
 def split(seed: int) -> tuple[np.ndarray, list[np.ndarray], float]:
@@ -309,13 +378,17 @@ def measure(quick: bool, images: Path | None = None, count: int = len(CHECKED)) 
     return rows(40 if quick else count) + (photographs(images) if images else [])
 
 
-def print_fit() -> None:
-    """Print the weights."""
+def print_fit(processes: int) -> None:
+    """Print the weights as they stand in `cosmic.vico.core.vision.certainty`."""
     cv2.setNumThreads(1)
-    state, odds, width = fit(FITTED)
-    for name, weight in zip((*certainty.NAMES, "alone"), state, strict=True):
-        sys.stdout.write(f"{name}: {weight:.2f}\n")
-    sys.stdout.write(f"right for each wrong: {odds:.2f}\n")
+    known = learned(FITTED, processes)
+    *weights, alone = fit(known)
+    wrong_ones = sum(not each.right for each in known)
+    width = np.percentile([each.pull for each in known if each.pull is not None], 95)
+    sys.stdout.write(f"# {', '.join(certainty.NAMES)}\n")
+    sys.stdout.write(f"WEIGHTS = ({', '.join(f'{each:.2f}' for each in weights)})\n")
+    sys.stdout.write(f"FITTED_LOGIT = {alone:.2f}\n")
+    sys.stdout.write(f"fitted to {len(known)} that were found, {wrong_ones} of them wrong\n")
     sys.stdout.write(f"95 % of lengths lie within {width:.2f} standard deviations\n")
 
 
@@ -323,9 +396,10 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--images", type=Path)
     parser.add_argument("--fit", action="store_true")
+    parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--count", type=int, default=len(CHECKED))
     chosen, sys.argv[1:] = parser.parse_known_args()
     if chosen.fit:
-        print_fit()
+        print_fit(chosen.processes)
     else:
         figures.main(__doc__, partial(measure, images=chosen.images, count=chosen.count))

@@ -81,7 +81,8 @@ class Drawn:
     Attributes
     ----------
     apart : float
-        By how many standard deviations of noise it differs from one fibre of the same course.
+        By how many standard deviations of noise it differs from one fibre of the same course; NaN
+        where it was not compared.
     gap_widths : float
         Between the two, in mean widths; negative where they overlap.
     """
@@ -342,8 +343,13 @@ def shaded(one: Piece, view: View) -> Piece:
     return replace(one, taken=np.clip(taken, 0.5, 1.45))
 
 
-def draw(kind: Kind, seed: int, *, jpeg: bool | None = None, large: bool = False) -> Drawn:
-    """Return an image of one kind."""
+def draw(
+    kind: Kind, seed: int, *, jpeg: bool | None = None, large: bool = False, compare: bool = True
+) -> Drawn:
+    """Return an image of one kind; without `compare` it is not said how far it is from one fibre.
+
+    Comparing takes most of the time.
+    """
     rng = np.random.default_rng([seed, list(Kind).index(kind)])
     while True:
         view = view_of(
@@ -359,12 +365,11 @@ def draw(kind: Kind, seed: int, *, jpeg: bool | None = None, large: bool = False
         there = [shaded(each, view) for each in there]
         light = light_of(rng, view)
         clean = without_noise(there, view, light)
+        image = taken_with(rng, view, clean)
         apart = np.inf
         if kind in (Kind.TOUCHING, Kind.OVERLAPPING, Kind.GAP):
-            image = taken_with(rng, view, clean)
-            apart = difference(as_one(there[0], there[1], gap), image, clean, view, light)
-        else:
-            image = taken_with(rng, view, clean)
+            one = as_one(there[0], there[1], gap)
+            apart = difference(one, image, clean, view, light) if compare else np.nan
         fibres = [as_one(there[0], there[1], 0.0)] if kind is Kind.GOES_ON else there
         return Drawn(image, fibres, kind, apart, gap, view)
 

@@ -1,14 +1,28 @@
 """What is certain is one whole fibre; what is whole is mostly certain."""
 
+import cv2
 import numpy as np
 import pytest
-from benchmarks.certainty import cases, drawn_cases, split, wrong
+from benchmarks.certainty import (
+    CHECKED,
+    FITTED,
+    LEAST_WEIGHT,
+    Example,
+    Population,
+    cases,
+    drawn_cases,
+    examples,
+    fit,
+    split,
+    wrong,
+)
 from benchmarks.fibre_pairs import TOLD_APART, Kind, draw
 
 from cosmic.vico.api import find_fibres
 from cosmic.vico.core.vision import checks
 from cosmic.vico.core.vision.axial import NAMES, Joints
-from cosmic.vico.core.vision.certainty import CERTAIN, Signs, probability
+from cosmic.vico.core.vision.certainty import CERTAIN, WEIGHTS, Signs, probability
+from cosmic.vico.core.vision.certainty import NAMES as SIGNS
 from unit.vico.vision.drawn_fibres import arc, drawn_image, strip
 
 PAIRS = (Kind.TOUCHING, Kind.OVERLAPPING, Kind.GAP)
@@ -93,3 +107,58 @@ def test_weak_signs_count_together_where_they_lie_in_one_place() -> None:
     uneven, joint = (Signs(Joints(along=along)) for along in (scattered, together))
     assert probability(uneven, []) >= CERTAIN
     assert probability(joint, []) < 0.9
+
+
+def test_a_compressed_fibre_without_a_sign_is_certain() -> None:
+    levels = [probability(Signs(compressed=level), []) for level in (0.0, 0.8, 1.5, 6.0)]
+    assert levels == sorted(levels, reverse=True)
+    assert levels[-1] >= CERTAIN
+    weak = Joints(along=np.full((len(NAMES), 1), 0.35))
+    plain, compressed = (probability(Signs(weak, compressed=level), []) for level in (0.0, 1.5))
+    assert plain > compressed
+
+
+def test_what_compression_hides_at_quality_75_counts_no_more_at_30() -> None:
+    image = drawn_image([arc((100.0, 200.0), 0.0, 300.0, 0.3)], [12.0], noise=4.0)
+    told = []
+    for quality in (30, 60, 75):
+        coded = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+        fibre = find_fibres(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE))[0]
+        told.append(fibre.signs[SIGNS.index("compressed")])
+    assert told[0] == told[1] == told[2] > 1.0
+    never = find_fibres(image)[0].signs[SIGNS.index("compressed")]
+    assert never < 0.1
+
+
+def learnt_from(gap: float, *, right: bool, others: float = 0.3) -> Example:
+    along = np.full((len(NAMES), 3), others)
+    along[0, 1] = gap
+    return Example(Signs(Joints(along=along)), right, None)
+
+
+def test_a_sign_that_tells_is_given_weight_and_one_that_does_not_is_left_at_the_floor() -> None:
+    gaps = np.linspace(0.0, 1.4, 29)
+    known = [learnt_from(gap, right=bool(gap < 0.7)) for gap in gaps]
+    *weights, alone = fit(known)
+    assert weights[0] > 3.0
+    assert weights[1:] == pytest.approx([LEAST_WEIGHT] * (len(SIGNS) - 1))
+    assert alone > 0.0
+
+
+def test_how_many_are_right_says_nothing_about_the_weights() -> None:
+    few = [learnt_from(gap, right=right) for gap in (0.3, 0.6, 1.0) for right in (True, False)]
+    many = few + 4 * [each for each in few if each.right]
+    np.testing.assert_allclose(fit(many), fit(few), atol=0.02)
+
+
+def test_what_is_learnt_is_the_same_again_and_is_never_what_is_checked() -> None:
+    for population in FITTED:
+        assert not set(population.seeds) & set(CHECKED)
+    part = Population((Kind.SINGLE, Kind.TOUCHING), range(335_000, 335_004))
+    first, again = (examples(part, part.seeds) for _ in range(2))
+    assert [each.right for each in first] == [each.right for each in again]
+    assert {True, False} == {each.right for each in first}
+    for one, other in zip(first, again, strict=True):
+        np.testing.assert_array_equal(
+            one.signs.weighed_by(WEIGHTS), other.signs.weighed_by(WEIGHTS)
+        )
