@@ -276,12 +276,12 @@ class PeripheralThread(WorkerThread):
         )
         self._state = now
         same_time = replace(now, time_s=before.time_s, wall_s=before.wall_s)
-        if same_time != before and not self._is_on_the_way(before, now):
+        if same_time != before and not self._only_travels(before, now):
             self._published = now
             self.state_changed.emit(now)
         lens.publish_ends()
 
-    def _is_on_the_way(self, before: PeripheralState, now: PeripheralState) -> bool:
+    def _only_travels(self, before: PeripheralState, now: PeripheralState) -> bool:
         """Return whether motors go on as told just before; a fast twin is looked at more often."""
         if not (self._clock.rate > 1.0 and before.moving and now.moving):
             return False

@@ -136,7 +136,7 @@ def learnt_from(gap: float, *, right: bool, others: float = 0.3) -> Example:
     return Example(Signs(Joints(along=along)), right, None)
 
 
-def test_a_sign_that_tells_is_given_weight_and_one_that_does_not_is_left_at_the_floor() -> None:
+def test_a_useful_sign_is_given_weight_and_a_useless_one_is_left_at_the_floor() -> None:
     gaps = np.linspace(0.0, 1.4, 29)
     known = [learnt_from(gap, right=bool(gap < 0.7)) for gap in gaps]
     *weights, alone = fit(known)
