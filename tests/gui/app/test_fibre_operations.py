@@ -244,6 +244,7 @@ def take(window: OperatorWindow, qtbot: QtBot) -> OperationCard:
 def test_an_operation_that_the_operator_ends_is_no_error(make: Make, qtbot: QtBot) -> None:
     window = with_fibres(make, qtbot)
     card = take(window, qtbot)
+    assert card.rect().contains(card.stop.geometry())
     qtbot.mouseClick(card.stop, LEFT)
     assert card.badge.state is State.BUSY  # nothing was refused: it is being made safe
     qtbot.waitUntil(lambda: not operations(window).running, timeout=60_000)

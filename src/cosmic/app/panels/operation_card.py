@@ -223,7 +223,9 @@ class OperationCard(QFrame):
         column = self.layout()
         if column is not None:  # adjustSize would take the height of another width
             column.activate()
-            self.resize(CARD_PX, column.totalHeightForWidth(CARD_PX))
+            # While it is shown for the first time no label may have a height for its width yet.
+            wanted = column.totalHeightForWidth(CARD_PX), column.totalSizeHint().height()
+            self.resize(CARD_PX, wanted[0] if column.hasHeightForWidth() else wanted[1])
         self.resized.emit()
 
     # What the operator does
