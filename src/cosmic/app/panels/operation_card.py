@@ -223,9 +223,10 @@ class OperationCard(QFrame):
         column = self.layout()
         if column is not None:  # adjustSize would take the height of another width
             column.activate()
-            # While it is shown for the first time no label may have a height for its width yet.
-            wanted = column.totalHeightForWidth(CARD_PX), column.totalSizeHint().height()
-            self.resize(CARD_PX, wanted[0] if column.hasHeightForWidth() else wanted[1])
+            height = column.totalHeightForWidth(CARD_PX)
+            if not column.hasHeightForWidth():  # when it is shown for the first time
+                height = column.totalSizeHint().height()
+            self.resize(CARD_PX, height)
         self.resized.emit()
 
     # What the operator does
