@@ -1,10 +1,17 @@
 """The card of an operation on a fibre: as high as what it says."""
 
+from typing import TYPE_CHECKING, cast
+
 import pytest
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.operation_card import OperationCard, at_work
+from cosmic.autonomy.procedures.run import RunState
 from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState, NodeView
+
+if TYPE_CHECKING:
+    from cosmic.autonomy.handling.context import HandlingContext
+    from cosmic.autonomy.procedures.run import ProcedureRun
 
 
 @pytest.mark.parametrize("words", [3, 12, 30])
@@ -16,6 +23,29 @@ def test_the_card_is_as_high_as_what_it_says(qtbot: QtBot, words: int) -> None:
     assert needed_px <= card.line.height() <= needed_px + 4
     card.show_refused("Take with left", "no")
     assert card.line.height() <= card.line.fontMetrics().lineSpacing() + 6
+
+
+class Run:
+    """As much of a run as the card looks at; `tree` is what the test says."""
+
+    state = RunState.RUNNING
+    tree = NodeView(NodeEvent((), "bend test", OPERATION, NodeState.WAITING), 1.0)
+
+    def work_at(self, name: str) -> None:
+        self.tree = NodeView(NodeEvent((), name, OPERATION, NodeState.RUNNING), 1.0)
+
+
+def test_a_running_card_is_as_high_as_what_it_says_and_can_be_ended(qtbot: QtBot) -> None:
+    run = Run()
+    card = OperationCard(50.0)
+    qtbot.addWidget(card)
+    card.follow("Take with left", cast("ProcedureRun[HandlingContext]", run))
+    assert card.rect().contains(card.stop.geometry())
+    for name in ("heights by focus", " ".join(["calibrate"] * 20)):
+        run.work_at(name)
+        card.refresh()
+        assert card.line.height() >= card.line.heightForWidth(card.line.width())
+        assert card.rect().contains(card.stop.geometry())
 
 
 @pytest.mark.parametrize(

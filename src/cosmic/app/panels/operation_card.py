@@ -205,7 +205,10 @@ class OperationCard(QFrame):
         ending = run.state is RunState.ABORTING
         self.badge.set_state(State.BUSY)
         view = run.tree
-        self.line.setText("ending, and making safe" if ending else at_work(view))
+        text = "ending, and making safe" if ending else at_work(view)
+        if text != self.line.text():
+            self.line.setText(text)
+            self._fit()
         self.progress.setValue(round(100 * share_done(view)))
         if ending and self.stop.hasFocus():
             self.setFocus()
@@ -224,7 +227,7 @@ class OperationCard(QFrame):
         if column is not None:  # adjustSize would take the height of another width
             column.activate()
             height = column.totalHeightForWidth(CARD_PX)
-            if not column.hasHeightForWidth():  # when it is shown for the first time
+            if not column.hasHeightForWidth():  # nothing was said on it yet
                 height = column.totalSizeHint().height()
             self.resize(CARD_PX, height)
         self.resized.emit()

@@ -56,7 +56,7 @@ class CentralView(QWidget):
         self._inset_wanted = True
         self._bar: QWidget | None = None
         self._card: QWidget | None = None
-        self._frame = named(QFrame(self), "stageInset")
+        self._frame = named(QFrame(self), "centralInset")
         self._frame.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         for each in (*self._cameras.values(), scene):
             each.setParent(self)

@@ -192,7 +192,7 @@ QProgressBar[look="bar"] { min-height: 8px; border: none; }
 #drawerLine QToolButton:checked { color: $text; border-top: 2px solid $accent; }
 #drawerBody { background: $panel; border-top: 2px solid $accent; }
 #centralView { background: $field; }
-#stageInset { background: $panel; border: 1px solid $border_strong; }
+#centralInset { background: $panel; border: 1px solid $border_strong; }
 #coach { background: $raised; border: 1px solid $border; border-radius: 4px; }
 #operationCard { background: $raised; border: 1px solid $border_strong; border-radius: 4px; }
 #padButton { padding: 0px; min-width: 30px; max-width: 46px; min-height: 26px; }
