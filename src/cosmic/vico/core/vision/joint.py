@@ -60,7 +60,7 @@ class Strip:
     where : ndarray of bool, shape (n / STRIDE,)
         Where a joint would be seen: away from ends, and from what crosses.
     facts : ndarray, shape (4,), float32
-        Noise in multiples of the contrast, blur in widths, how narrow it is, and JPEG.
+        Noise in multiples of the contrast, blur in widths, JPEG, and its blocks in widths.
     """
 
     levels: Floats32
@@ -68,7 +68,7 @@ class Strip:
     facts: Floats32
 
 
-def joint(scene: Scene, course: Course) -> float:
+def clearest(scene: Scene, course: Course) -> float:
     """Return how clearly one fibre ends on a course and another begins; 0 where none is seen."""
     found = strip_of(scene, course)
     return 0.0 if found is None else clearness(found)
@@ -109,7 +109,10 @@ def strip_of(scene: Scene, course: Course) -> Strip | None:
     levels[:, ROWS] = np.clip(_turned(course, s, at), -MOST_TURNED, MOST_TURNED)
     levels[~free] = 0.0
     levels[:, -1] = free
-    facts = [course.noise / typical, course.blur_px / width, 4.0 / width, scene.blockiness]
+    # Of a cell of the strip, which is the mean of many pixels where a fibre is thick.
+    noise = course.noise / typical * min(1.0, np.sqrt(PER_WIDTH * ROWS / (2.0 * REACH)) / width)
+    coded = scene.blockiness
+    facts = [noise, course.blur_px / width, coded, coded * LEAST_WIDTH_PX / width]
     return Strip(levels, where, np.minimum(facts, 1.0).astype(np.float32))
 
 
