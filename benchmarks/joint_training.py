@@ -23,8 +23,8 @@ CHANNELS, FACTS, WHOLE, TAPS = 48, 4, 32, 5
 COLUMNS = 8192
 """Columns of strips that are learnt from at once."""
 LENGTHS = (128, 192, 256, 384, 512, 640)
-STEPS, RATE, DECAY = 6000, 3e-3, 1e-4
-HELD_BACK = 10
+STEPS, RATE, DECAY = 4500, 3e-3, 1e-4
+HELD_BACK = 11
 """One seed of so many is not learnt from, but only looked at."""
 PLACE_SHARE, MORE = 0.3, 4.0
 """How much it counts where a joint is, beside whether there is one; and how much more a joint."""
