@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from cosmic.vico.core.vision import axial, beyond
+from cosmic.vico.core.vision import axial, beyond, joint
 from cosmic.vico.core.vision.axial import Joints
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.grey import Floats, Mask
@@ -24,12 +24,12 @@ from cosmic.vico.core.vision.refine import Course
 CERTAIN: Final = 0.999
 IMPROBABLE: Final = "weak signs together make it less than certain that it is one whole fibre"
 
-NAMES: Final = (*axial.NAMES, "goes on", "soft", "compressed")
+NAMES: Final = (*axial.NAMES, "goes on", "soft", "compressed", "joint")
 WEIGHTS: Final = (
-    0.44, 0.69, 1.47, 0.90, 0.10, 3.92, 1.37, 1.38, 0.10, 1.51, 1.77, 3.15, 3.12, 1.24,
+    0.10, 0.10, 0.21, 0.34, 0.10, 1.32, 0.68, 0.80, 0.10, 0.10, 0.10, 4.19, 2.11, 0.55, 5.09,
 )  # fmt: skip
 """Fitted to 4947 fibres and pairs, right and wrong ones alike in say; a tenth is a floor."""
-FITTED_LOGIT: Final = 5.55
+FITTED_LOGIT: Final = 5.82
 """Logit of the probability where there is no sign, on images of which a half is no single fibre."""
 FITTED_ODDS: Final = 1.0
 PRIOR_ODDS: Final = 60.0
@@ -53,12 +53,16 @@ CUT_OFF: Final = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Signs:
-    """Signs that a fibre is not one, or not whole; each counts by itself from 1 on."""
+    """Signs that a fibre is not one, or not whole; each counts by itself from 1 on.
+
+    What is compressed, or what a network takes for a joint, counts with the others only.
+    """
 
     joints: Joints = field(default_factory=Joints)
     goes_on: float = 0.0
     soft: float = 0.0
     compressed: float = 0.0
+    joint: float = 0.0
 
     @property
     def doubts(self) -> list[str]:
@@ -88,7 +92,8 @@ class Signs:
         above = np.maximum(along - NOISE, 0.0)
         place = int(np.argmax(np.asarray(weights[: len(along)]) @ above))
         whole = np.clip([self.goes_on, self.soft, self.compressed], 0.0, MOST)
-        return np.concatenate([along[:, place], whole])
+        learned = np.clip([self.joint], 0.0, MOST_ALONG)
+        return np.concatenate([along[:, place], whole, learned])
 
 
 def signs_of(scene: Scene, course: Course, explained: Mask) -> Signs:
@@ -98,6 +103,7 @@ def signs_of(scene: Scene, course: Course, explained: Mask) -> Signs:
         beyond.goes_on(scene, course, explained),
         beyond.soft(course),
         scene.blockiness / BLOCKY,
+        joint.clearest(scene, course),
     )
 
 

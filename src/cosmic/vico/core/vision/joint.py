@@ -42,7 +42,7 @@ MOST_TURNED: Final = 1.5
 MIRRORED: Final = np.array([1.0] * ROWS + [-1.0, 1.0], np.float32)
 """What becomes of the channels of a strip where its sides are swapped, beside their order."""
 LEAST_VARIANCE: Final = 1e-4
-NONE_LOGIT: Final = -4.0
+NONE_LOGIT: Final = -9.0
 CLEAR_LOGIT: Final = 2.0
 """Logits at which the sign is 0 and 1."""
 
