@@ -37,8 +37,7 @@ LENGTH_PART = 0.03
 OWN = {axial.GAP, axial.DOUBLED, axial.STEP, beyond.GOES_ON, beyond.SOFT, certainty.IMPROBABLE}
 GRIP = 1e-4
 """How strongly weights are kept small in the fit."""
-LEAST_WEIGHT = 1.5
-"""The hand-made signs keep their say where a network has learnt from drawings alone."""
+LEAST_WEIGHT = 0.1
 ROUNDS = 8
 FIRST_WEIGHT, FIRST_LOGIT = 1.5, 8.0
 PART = 50

@@ -26,13 +26,13 @@ IMPROBABLE: Final = "weak signs together make it less than certain that it is on
 
 NAMES: Final = (*axial.NAMES, "goes on", "soft", "compressed", "joint")
 WEIGHTS: Final = (
-    1.50, 1.50, 1.50, 1.50, 1.50, 1.50, 1.50, 1.50, 1.50, 1.50, 1.50, 5.53, 2.85, 1.75, 3.44,
+    0.10, 0.10, 0.21, 0.34, 0.10, 1.32, 0.68, 0.80, 0.10, 0.10, 0.10, 4.19, 2.11, 0.55, 5.09,
 )  # fmt: skip
-"""Fitted to 4947 fibres and pairs, right and wrong ones alike in say; 1.5 is a floor."""
-FITTED_LOGIT: Final = 8.63
+"""Fitted to 4947 fibres and pairs, right and wrong ones alike in say; a tenth is a floor."""
+FITTED_LOGIT: Final = 5.82
 """Logit of the probability where there is no sign, on images of which a half is no single fibre."""
 FITTED_ODDS: Final = 1.0
-PRIOR_ODDS: Final = 30.0
+PRIOR_ODDS: Final = 60.0
 """Whole fibres for each that is two or a part, among what is found: a guess, on the safe side."""
 ALONE: Final = FITTED_LOGIT + log(PRIOR_ODDS / FITTED_ODDS)
 DOUBT: Final = 6.0
