@@ -68,10 +68,13 @@ class Strip:
     facts: Floats32
 
 
-def clearest(scene: Scene, course: Course) -> float:
-    """Return how clearly one fibre ends on a course and another begins; 0 where none is seen."""
+def clearest(scene: Scene, course: Course) -> float | None:
+    """Return how clearly one fibre ends on a course and another begins; 0 where none is seen.
+
+    None where the fibre is too thin or too short to tell.
+    """
     found = strip_of(scene, course)
-    return 0.0 if found is None else clearness(found)
+    return None if found is None else clearness(found)
 
 
 def clearness(strip: Strip) -> float:
