@@ -9,7 +9,7 @@ What would last for ever, such as a plug pulled out, is cleared after some secon
 contact or an overload is: nothing recovers alone from what only a hand can mend. Some of these are
 then left as they are: the campaign has to end within half a minute and name what is broken.
 
-    python -m benchmarks.campaign_faults          # about 15 minutes on two quiet cores
+    python -m benchmarks.campaign_faults          # about 25 minutes on two quiet cores
 """
 
 import tempfile
@@ -27,6 +27,8 @@ from cosmic.twin.truth import read_truth
 NAME = "campaign_faults"
 RATE = 20.0
 LIMIT_S = 120.0
+REAL_RATE, REAL_LIMIT_S = 1.0, 600.0
+"""A camera is waited for by the wall: how soon all is over counts where both clocks are one."""
 PEAK_UN = 0.8 * 180.0
 RECIPE = """
 procedure = "bend test"
@@ -52,6 +54,8 @@ class Trouble:
     ----------
     lasts_s : float
         Wall time after which it is cleared; 0: it clears itself, or never.
+    platform_s : float
+        The same on the platform's clock, by which the force is waited for.
     words : str
         What the end must name where it is not cleared and cannot be mended; "" where it can.
     """
@@ -60,7 +64,12 @@ class Trouble:
     at: str = "turn the table"
     where: tuple[tuple[str, Any], ...] = ()
     lasts_s: float = 0.0
+    platform_s: float = 0.0
     words: str = ""
+
+    def is_over(self, platform_s: float, wall_s: float) -> bool:
+        """Return whether it is cleared so long after it struck."""
+        return 0.0 < self.platform_s <= platform_s or 0.0 < self.lasts_s <= wall_s
 
 
 TROUBLES = (
@@ -75,9 +84,9 @@ TROUBLES = (
     Trouble("light_dimmed"),
     Trouble("zoom_lost_steps"),
     Trouble("sensor_drift", where=(("amount", 0.2),)),
-    Trouble("sensor_saturated", at="push the spans", lasts_s=3.0),
+    Trouble("sensor_saturated", at="push the spans", platform_s=5.0),
     Trouble("board overrun", at="push the spans"),
-    Trouble("board unplugged", at="push the spans", lasts_s=3.0),
+    Trouble("board unplugged", at="push the spans", platform_s=5.0),
     Trouble("camera unplugged", lasts_s=2.0),
     Trouble("camera lost", where=(("share", 0.3),)),
     Trouble("camera incomplete", where=(("share", 0.3),)),
@@ -138,13 +147,15 @@ class Outcomes:
         return ended and not self.contacts and self.peak_un <= PEAK_UN
 
 
-def try_one(trouble: Trouble, folder: Path) -> Outcomes:
-    """Run a campaign with one fault to its end."""
+def try_one(
+    trouble: Trouble, folder: Path, rate: float = RATE, limit_s: float = LIMIT_S
+) -> Outcomes:
+    """Run a campaign with one fault to its end, or until `limit_s` have passed on the wall."""
     recipe = folder / "two.toml"
     recipe.write_text(RECIPE, encoding="utf-8")
     truth = folder / "truth.jsonl"
     struck = Event()
-    with cosmic.connect(rate=RATE, sample="three-dry", seed=3, truth=truth) as rig:
+    with cosmic.connect(rate=rate, sample="three-dry", seed=3, truth=truth) as rig:
         campaign = rig.campaign(recipe, folder / "out")
 
         def look() -> None:
@@ -155,16 +166,17 @@ def try_one(trouble: Trouble, folder: Path) -> Outcomes:
         campaign.on_change(look)
         began_s = WALL.now_s()
         campaign.start()
-        until_s: float | None = None
-        clock, struck_s = campaign.work.clock, (0.0, 0.0)
-        while not campaign.over and WALL.now_s() - began_s < LIMIT_S:
+        clock, struck_s, cleared = campaign.work.clock, (0.0, 0.0), False
+        while not campaign.over and WALL.now_s() - began_s < limit_s:
             WALL.sleep(0.02)
-            if struck.is_set() and until_s is None:
+            if not struck.is_set():
+                continue
+            if not any(struck_s):
                 struck_s = clock.now_s(), WALL.now_s()
-                until_s = WALL.now_s() + (trouble.lasts_s or LIMIT_S)
-            if until_s is not None and trouble.lasts_s and WALL.now_s() > until_s:
+            passed_s = clock.now_s() - struck_s[0], WALL.now_s() - struck_s[1]
+            if not cleared and trouble.is_over(*passed_s):
                 rig.faults.clear(trouble.name)
-                until_s = WALL.now_s() + LIMIT_S
+                cleared, began_s = True, WALL.now_s()
         over = campaign.over
         took_s = max(clock.now_s() - struck_s[0], WALL.now_s() - struck_s[1])
         if not over:
@@ -197,7 +209,7 @@ def measure(quick: bool = False) -> list[Figure]:
         ]
     for trouble in () if quick else LASTING:
         with tempfile.TemporaryDirectory() as folder:
-            found = try_one(trouble, Path(folder))
+            found = try_one(trouble, Path(folder), REAL_RATE, REAL_LIMIT_S)
         name = f"{trouble.name} for good, at {trouble.at}"
         print(f"{name}: {found.reason}", flush=True)
         named = found.safe and trouble.words in found.reason

@@ -35,8 +35,10 @@ from cosmic.frame.errors import DeviceError, NotAvailable
 logger = logging.getLogger(__name__)
 
 NO_FORCE: Final = "force sensor"
-LOOKS: Final = 8
-APART_S: Final = 4.0
+LOOKS: Final = 4
+APART_S: Final = 3.0
+"""A contact that was loose is back within three of these; a campaign that waits so twice, in the
+fibre and before the next, still ends within half a minute."""
 LOOK_S: Final = 0.02
 HIGHEST_PART: Final = 0.5
 """Of the force that stops everything: what the sensor may read with nothing at the probe."""
