@@ -45,7 +45,7 @@ LOOKED_AT_ODDS: Final = 50.0
 """The same where a network has looked for a joint."""
 MORE_ODDS: Final = 2.0
 """So much more probable than the hand-made signs alone say a fibre is at most, where a network
-sees no joint: it may be blind to what it was not shown, and is to what compression took away."""
+sees no joint: it may be blind to what it was not shown."""
 DOUBT: Final = 6.0
 """What each reason to doubt takes off: a guess."""
 NOISE: Final = 0.25
@@ -128,9 +128,10 @@ def probability(signs: Signs, doubts: Sequence[str]) -> float:
     if not CUT_OFF.isdisjoint(doubts):
         return 0.0
     logit = HAND_LOGIT - signs.taken_by(HAND_WEIGHTS) + log(PRIOR_ODDS)
-    if signs.joint is not None:
+    # What compression took away a network cannot see, and what it left looks like joints to it.
+    if signs.joint is not None and signs.compressed <= NOISE:
         both = FITTED_LOGIT - signs.taken_by(WEIGHTS) + log(LOOKED_AT_ODDS)
-        logit = min(both, logit + log(MORE_ODDS) * max(0.0, 1.0 - signs.compressed))
+        logit = min(both, logit + log(MORE_ODDS))
     return 1.0 / (1.0 + exp(DOUBT * len({*doubts, *signs.doubts}) - logit))
 
 
