@@ -193,8 +193,8 @@ def learned(populations: Iterable[Population], processes: int = 1) -> list[Examp
         return [one for found in pool.map(examples, *zip(*parts, strict=True)) for one in found]
 
 
-def fit(known: Sequence[Example]) -> np.ndarray:
-    """Return the weights and, last, the logit where there is no sign.
+def fit(known: Sequence[Example], count: int = len(certainty.NAMES)) -> np.ndarray:
+    """Return the weights of the first `count` signs and, last, the logit where there is none.
 
     The right and the wrong ones count as much together, however many they are. A joint is in one
     place: of each fibre the signs of the place count where together they weigh most. Which that is
@@ -203,7 +203,7 @@ def fit(known: Sequence[Example]) -> np.ndarray:
     right = np.array([each.right for each in known])
     y = np.where(right, 1.0, -1.0)
     share = np.where(right, 0.5 / max(right.mean(), 1e-9), 0.5 / max(1.0 - right.mean(), 1e-9))
-    state = np.append(np.full(len(certainty.NAMES), FIRST_WEIGHT), FIRST_LOGIT)
+    state = np.append(np.full(count, FIRST_WEIGHT), FIRST_LOGIT)
     for number in range(ROUNDS):
         x = np.array([each.signs.weighed_by(state[:-1]) for each in known])
 
@@ -382,12 +382,16 @@ def print_fit(processes: int) -> None:
     """Print the weights as they stand in `cosmic.vico.core.vision.certainty`."""
     cv2.setNumThreads(1)
     known = learned(FITTED, processes)
-    *weights, alone = fit(known)
     wrong_ones = sum(not each.right for each in known)
     width = np.percentile([each.pull for each in known if each.pull is not None], 95)
     sys.stdout.write(f"# {', '.join(certainty.NAMES)}\n")
-    sys.stdout.write(f"WEIGHTS = ({', '.join(f'{each:.2f}' for each in weights)})\n")
-    sys.stdout.write(f"FITTED_LOGIT = {alone:.2f}\n")
+    for names, count in (
+        ("HAND_WEIGHTS, HAND_LOGIT", certainty.HAND_MADE),
+        ("WEIGHTS, FITTED_LOGIT", len(certainty.NAMES)),
+    ):
+        *weights, alone = fit(known, count)
+        written = ", ".join(f"{each:.2f}" for each in weights)
+        sys.stdout.write(f"{names} = ({written}), {alone:.2f}\n")
     sys.stdout.write(f"fitted to {len(known)} that were found, {wrong_ones} of them wrong\n")
     sys.stdout.write(f"95 % of lengths lie within {width:.2f} standard deviations\n")
 

@@ -351,6 +351,22 @@ def draw(
     Comparing takes most of the time.
     """
     rng = np.random.default_rng([seed, list(Kind).index(kind)])
+    there, gap, view = composed(rng, kind, jpeg=jpeg, large=large)
+    light = light_of(rng, view)
+    clean = without_noise(there, view, light)
+    image = taken_with(rng, view, clean)
+    apart = np.inf
+    if kind in (Kind.TOUCHING, Kind.OVERLAPPING, Kind.GAP):
+        one = as_one(there[0], there[1], gap)
+        apart = difference(one, image, clean, view, light) if compare else np.nan
+    fibres = [as_one(there[0], there[1], 0.0)] if kind is Kind.GOES_ON else there
+    return Drawn(image, fibres, kind, apart, gap, view)
+
+
+def composed(
+    rng: np.random.Generator, kind: Kind, *, jpeg: bool | None, large: bool
+) -> tuple[list[Piece], float, View]:
+    """Return what is on an image of one kind, the gap in widths, and how it is taken."""
     while True:
         view = view_of(
             rng, jpeg=bool(rng.integers(0, 3) == 0) if jpeg is None else jpeg, large=large
@@ -360,18 +376,8 @@ def draw(
         rough = float(rng.choice([0.0, 0.02, 0.05, 0.08]))
         pieces, gap = _pieces(rng, kind, width, rough, 2.8 if long else 1.4 if large else 1.0)
         there = placed(rng, pieces, view)
-        if there is None:
-            continue
-        there = [shaded(each, view) for each in there]
-        light = light_of(rng, view)
-        clean = without_noise(there, view, light)
-        image = taken_with(rng, view, clean)
-        apart = np.inf
-        if kind in (Kind.TOUCHING, Kind.OVERLAPPING, Kind.GAP):
-            one = as_one(there[0], there[1], gap)
-            apart = difference(one, image, clean, view, light) if compare else np.nan
-        fibres = [as_one(there[0], there[1], 0.0)] if kind is Kind.GOES_ON else there
-        return Drawn(image, fibres, kind, apart, gap, view)
+        if there is not None:
+            return [shaded(each, view) for each in there], gap, view
 
 
 def _pieces(

@@ -79,6 +79,12 @@ def test_a_joint_that_compression_or_roughness_hides_is_not_certain(seed: int, j
     assert wrong(drawn_cases(one)) == 0
 
 
+@pytest.mark.parametrize("seed", [1_511_428, 1_511_443])
+def test_a_joint_that_shows_in_no_single_sign_is_not_certain(seed: int) -> None:
+    one = draw(PAIRS[seed % 3], seed, large=seed % 7 < 2)
+    assert wrong(drawn_cases(one)) == 0
+
+
 def test_what_goes_on_faintly_beyond_an_end_is_seen() -> None:
     line = arc((60.0, 200.0), 0.0, 250.0, 0.0)
     image = drawn_image([line], [12.0], noise=2.0).astype(np.float32)
@@ -107,6 +113,22 @@ def test_weak_signs_count_together_where_they_lie_in_one_place() -> None:
     uneven, joint = (Signs(Joints(along=along)) for along in (scattered, together))
     assert probability(uneven, []) >= CERTAIN
     assert probability(joint, []) < 0.9
+
+
+def test_a_network_that_sees_no_joint_makes_little_of_the_other_signs() -> None:
+    weak = Joints(along=np.full((len(NAMES), 1), 0.5))
+    alone, looked = (probability(Signs(weak, joint=level), []) for level in (None, 0.0))
+    assert alone < looked
+    assert looked / (1.0 - looked) < 2.5 * alone / (1.0 - alone)
+    levels = (None, 0.0, 2.0)
+    coded = [probability(Signs(weak, compressed=0.5, joint=level), []) for level in levels]
+    assert coded == [coded[0]] * len(levels), "on a compressed image it is not asked"
+
+
+def test_a_network_that_sees_a_joint_takes_the_certainty_away() -> None:
+    told = [probability(Signs(joint=level), []) for level in (0.0, 0.5, 1.0, 2.0)]
+    assert told == sorted(told, reverse=True)
+    assert told[0] >= CERTAIN > told[2]
 
 
 def test_a_compressed_fibre_without_a_sign_is_certain() -> None:

@@ -3,7 +3,8 @@
 The signs along a fibre and at its ends are weighed together: each lowers the probability, the more
 the clearer it is. The weights are those of `benchmarks/certainty.py`, which draws single fibres and
 pairs, finds them, and fits a logistic curve to what came out. Half of what it draws is no single
-fibre; the probability told is for a sample in which one of a hundred is not.
+fibre; the probability told is for a sample in which one of sixty is not. The last sign is learned:
+what the others find improbable it does not make certain.
 """
 
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from cosmic.vico.core.vision import axial, beyond
+from cosmic.vico.core.vision import axial, beyond, joint
 from cosmic.vico.core.vision.axial import Joints
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.grey import Floats, Mask
@@ -24,17 +25,27 @@ from cosmic.vico.core.vision.refine import Course
 CERTAIN: Final = 0.999
 IMPROBABLE: Final = "weak signs together make it less than certain that it is one whole fibre"
 
-NAMES: Final = (*axial.NAMES, "goes on", "soft", "compressed")
-WEIGHTS: Final = (
+NAMES: Final = (*axial.NAMES, "goes on", "soft", "compressed", "joint")
+HAND_MADE: Final = len(NAMES) - 1
+"""Signs before the learned one."""
+HAND_WEIGHTS: Final = (
     0.44, 0.69, 1.47, 0.90, 0.10, 3.92, 1.37, 1.38, 0.10, 1.51, 1.77, 3.15, 3.12, 1.24,
 )  # fmt: skip
-"""Fitted to 4947 fibres and pairs, right and wrong ones alike in say; a tenth is a floor."""
-FITTED_LOGIT: Final = 5.55
+WEIGHTS: Final = (
+    0.10, 0.10, 0.26, 0.41, 0.10, 1.28, 0.74, 0.84, 0.10, 0.13, 0.10, 3.85, 2.08, 0.70, 5.76,
+)  # fmt: skip
+"""Without and with the learned sign, fitted to 4947 fibres and pairs, right and wrong ones alike
+in say; a tenth is a floor."""
+HAND_LOGIT: Final = 5.55
+FITTED_LOGIT: Final = 5.23
 """Logit of the probability where there is no sign, on images of which a half is no single fibre."""
-FITTED_ODDS: Final = 1.0
 PRIOR_ODDS: Final = 60.0
 """Whole fibres for each that is two or a part, among what is found: a guess, on the safe side."""
-ALONE: Final = FITTED_LOGIT + log(PRIOR_ODDS / FITTED_ODDS)
+LOOKED_AT_ODDS: Final = 50.0
+"""The same where a network has looked for a joint."""
+MORE_ODDS: Final = 2.0
+"""So much more probable than the hand-made signs alone say a fibre is at most, where a network
+sees no joint: it may be blind to what it was not shown."""
 DOUBT: Final = 6.0
 """What each reason to doubt takes off: a guess."""
 NOISE: Final = 0.25
@@ -53,12 +64,17 @@ CUT_OFF: Final = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Signs:
-    """Signs that a fibre is not one, or not whole; each counts by itself from 1 on."""
+    """Signs that a fibre is not one, or not whole; each counts by itself from 1 on.
+
+    What is compressed, or what a network takes for a joint, counts with the others only. None: no
+    network has looked.
+    """
 
     joints: Joints = field(default_factory=Joints)
     goes_on: float = 0.0
     soft: float = 0.0
     compressed: float = 0.0
+    joint: float | None = None
 
     @property
     def doubts(self) -> list[str]:
@@ -76,19 +92,24 @@ class Signs:
         return tuple(self._at(WEIGHTS).tolist())
 
     def weighed_by(self, weights: Sequence[float]) -> Floats:
-        """Return what is above noise of each sign, in the order of `NAMES`.
+        """Return what is above noise of each sign that has a weight, in the order of `NAMES`.
 
         Those along the fibre are of the one place where together they weigh most: a joint is in
         one place, the unevenness of one fibre is scattered.
         """
         return np.maximum(self._at(weights) - NOISE, 0.0)
 
+    def taken_by(self, weights: Sequence[float]) -> float:
+        """Return what signs take off the logit."""
+        return float(self.weighed_by(weights) @ np.asarray(weights))
+
     def _at(self, weights: Sequence[float]) -> Floats:
         along = np.minimum(self.joints.along, MOST_ALONG)
         above = np.maximum(along - NOISE, 0.0)
         place = int(np.argmax(np.asarray(weights[: len(along)]) @ above))
         whole = np.clip([self.goes_on, self.soft, self.compressed], 0.0, MOST)
-        return np.concatenate([along[:, place], whole])
+        learned = np.clip([self.joint or 0.0], 0.0, MOST_ALONG)
+        return np.concatenate([along[:, place], whole, learned])[: len(weights)]
 
 
 def signs_of(scene: Scene, course: Course, explained: Mask) -> Signs:
@@ -98,6 +119,7 @@ def signs_of(scene: Scene, course: Course, explained: Mask) -> Signs:
         beyond.goes_on(scene, course, explained),
         beyond.soft(course),
         scene.blockiness / BLOCKY,
+        joint.clearest(scene, course),
     )
 
 
@@ -105,8 +127,12 @@ def probability(signs: Signs, doubts: Sequence[str]) -> float:
     """Return how probable it is that something is one whole fibre."""
     if not CUT_OFF.isdisjoint(doubts):
         return 0.0
-    taken = float(signs.weighed_by(WEIGHTS) @ np.asarray(WEIGHTS))
-    return 1.0 / (1.0 + exp(taken + DOUBT * len({*doubts, *signs.doubts}) - ALONE))
+    logit = HAND_LOGIT - signs.taken_by(HAND_WEIGHTS) + log(PRIOR_ODDS)
+    # What compression took away a network cannot see, and what it left looks like joints to it.
+    if signs.joint is not None and signs.compressed <= NOISE:
+        both = FITTED_LOGIT - signs.taken_by(WEIGHTS) + log(LOOKED_AT_ODDS)
+        logit = min(both, logit + log(MORE_ODDS))
+    return 1.0 / (1.0 + exp(DOUBT * len({*doubts, *signs.doubts}) - logit))
 
 
 def interval(length: float, std: float) -> tuple[float, float]:
