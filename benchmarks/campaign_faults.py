@@ -52,9 +52,9 @@ class Trouble:
 
     Attributes
     ----------
-    lasts_s : float
+    lasts_wall_s : float
         Wall time after which it is cleared; 0: it clears itself, or never.
-    platform_s : float
+    lasts_s : float
         The same on the platform's clock, by which the force is waited for.
     words : str
         What the end must name where it is not cleared and cannot be mended; "" where it can.
@@ -63,13 +63,13 @@ class Trouble:
     name: str
     at: str = "turn the table"
     where: tuple[tuple[str, Any], ...] = ()
+    lasts_wall_s: float = 0.0
     lasts_s: float = 0.0
-    platform_s: float = 0.0
     words: str = ""
 
-    def is_over(self, platform_s: float, wall_s: float) -> bool:
+    def is_over(self, passed_s: float, passed_wall_s: float) -> bool:
         """Return whether it is cleared so long after it struck."""
-        return 0.0 < self.platform_s <= platform_s or 0.0 < self.lasts_s <= wall_s
+        return 0.0 < self.lasts_s <= passed_s or 0.0 < self.lasts_wall_s <= passed_wall_s
 
 
 TROUBLES = (
@@ -84,22 +84,24 @@ TROUBLES = (
     Trouble("light_dimmed"),
     Trouble("zoom_lost_steps"),
     Trouble("sensor_drift", where=(("amount", 0.2),)),
-    Trouble("sensor_saturated", at="push the spans", platform_s=5.0),
+    Trouble("sensor_saturated", at="push the spans", lasts_s=5.0),
     Trouble("board overrun", at="push the spans"),
-    Trouble("board unplugged", at="push the spans", platform_s=5.0),
-    Trouble("camera unplugged", lasts_s=2.0),
+    Trouble("board unplugged", at="push the spans", lasts_s=5.0),
+    Trouble("camera unplugged", lasts_wall_s=2.0),
     Trouble("camera lost", where=(("share", 0.3),)),
     Trouble("camera incomplete", where=(("share", 0.3),)),
-    Trouble("camera frozen", lasts_s=3.0),
-    Trouble("controller lost_completed", at="carry to the probe", lasts_s=3.0),
+    Trouble("camera frozen", lasts_wall_s=3.0),
+    Trouble("controller lost_completed", at="carry to the probe", lasts_wall_s=3.0),
     Trouble("controller doubled_completed", at="carry to the probe"),
     Trouble(
         "controller end_stop",
         at="carry to the probe",
         where=(("device", 0), ("channel", 0)),
-        lasts_s=1.0,
+        lasts_wall_s=1.0,
     ),
-    Trouble("controller unplugged", at="carry to the probe", where=(("device", 0),), lasts_s=3.0),
+    Trouble(
+        "controller unplugged", at="carry to the probe", where=(("device", 0),), lasts_wall_s=3.0
+    ),
 )
 
 

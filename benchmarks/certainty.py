@@ -81,14 +81,23 @@ def tellable(one: Drawn) -> bool:
     return one.kind not in PAIRS or one.apart >= TOLD_APART
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Traced:
+    """Something that was found: where it lies, and its signs all along."""
+
+    scene: Scene
+    course: Course
+    signs: certainty.Signs
+
+
 @contextmanager
-def recorded() -> Iterator[list[certainty.Signs]]:
-    """Keep the signs of everything that is found meanwhile, all along each fibre."""
-    found: list[certainty.Signs] = []
+def recorded() -> Iterator[list[Traced]]:
+    """Keep everything that is found meanwhile."""
+    found: list[Traced] = []
 
     def signs_of(scene: Scene, course: Course, explained: Mask) -> certainty.Signs:
-        found.append(original(scene, course, explained))
-        return found[-1]
+        found.append(Traced(scene, course, original(scene, course, explained)))
+        return found[-1].signs
 
     original = certainty.signs_of
     with patch.object(certainty, "signs_of", signs_of):
@@ -155,19 +164,24 @@ def examples(population: Population, seeds: Iterable[int]) -> list[Example]:
     found = []
     for seed in seeds:
         one = population.draw(seed, compare=False)
-        with recorded() as signs:
+        with recorded() as traced:
             on_image = drawn_cases(one)
         kept = [each for each in on_image if learnable(each, one.kind)]
         wrongs = one.kind in PAIRS and any(not case.right for case in kept)
         if wrongs and not tellable(population.draw(seed, compare=True)):
             continue
         for case in kept:
-            own = next(each for each in signs if each.values == case.fibre.signs)
+            own = of_fibre(traced, case.fibre).signs
             pull = None
             if case.right and not own.doubts:
                 pull = abs(case.fibre.length_px - case.length_px) / case.fibre.length_std_px
             found.append(Example(thinned(own), case.right, pull))
     return found
+
+
+def of_fibre(traced: Iterable[Traced], fibre: Fibre) -> Traced:
+    """Return what became a fibre."""
+    return next(each for each in traced if each.signs.values == fibre.signs)
 
 
 def learnable(case: Case, kind: Kind) -> bool:
@@ -385,14 +399,16 @@ def print_fit(processes: int) -> None:
     wrong_ones = sum(not each.right for each in known)
     width = np.percentile([each.pull for each in known if each.pull is not None], 95)
     sys.stdout.write(f"# {', '.join(certainty.NAMES)}\n")
-    for names, count in (
-        ("HAND_WEIGHTS, HAND_LOGIT", certainty.HAND_MADE),
-        ("WEIGHTS, FITTED_LOGIT", len(certainty.NAMES)),
+    looked = [each for each in known if each.signs.joint is not None]
+    for names, of, count in (
+        ("HAND_WEIGHTS, HAND_LOGIT", known, certainty.HAND_MADE),
+        ("WEIGHTS, FITTED_LOGIT", looked, len(certainty.NAMES)),
     ):
-        *weights, alone = fit(known, count)
+        *weights, alone = fit(of, count)
         written = ", ".join(f"{each:.2f}" for each in weights)
         sys.stdout.write(f"{names} = ({written}), {alone:.2f}\n")
     sys.stdout.write(f"fitted to {len(known)} that were found, {wrong_ones} of them wrong\n")
+    sys.stdout.write(f"a network has looked at {len(looked)} of them\n")
     sys.stdout.write(f"95 % of lengths lie within {width:.2f} standard deviations\n")
 
 

@@ -8,13 +8,11 @@ certainty are fitted to, or checked on.
 """
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from unittest.mock import patch
 
 import cv2
 import numpy as np
@@ -24,10 +22,8 @@ from benchmarks import certainty as benchmark
 from benchmarks import fibre_images, fibre_pairs
 from benchmarks.fibre_pairs import TOLD_APART, Kind
 from cosmic.vico.api import find_fibres
-from cosmic.vico.core.vision import certainty, joint
-from cosmic.vico.core.vision.certainty import Signs
-from cosmic.vico.core.vision.grey import Mask
-from cosmic.vico.core.vision.joint import Strip
+from cosmic.vico.core.vision import learned_joint
+from cosmic.vico.core.vision.learned_joint import Strip
 from cosmic.vico.core.vision.profiles import Scene, cross_sections
 from cosmic.vico.core.vision.refine import Course
 from cosmic.vico.core.vision.relief import blockiness
@@ -55,21 +51,6 @@ class Known:
     strip: Strip
     ends: np.ndarray
     seed: int
-
-
-@contextmanager
-def recorded() -> Iterator[list[tuple[Scene, Course, Signs]]]:
-    """Keep where everything lies that is found meanwhile."""
-    found: list[tuple[Scene, Course, Signs]] = []
-
-    def signs_of(scene: Scene, course: Course, explained: Mask) -> Signs:
-        signs = original(scene, course, explained)
-        found.append((scene, course, signs))
-        return signs
-
-    original = certainty.signs_of
-    with patch.object(certainty, "signs_of", signs_of):
-        yield found
 
 
 def ends_on(course: Course, points: np.ndarray, count: int, *, right: bool) -> np.ndarray | None:
@@ -102,19 +83,19 @@ def found_on(
     image: np.ndarray, lines: list[np.ndarray], points: np.ndarray
 ) -> list[tuple[Scene, Course, np.ndarray]]:
     """Return what is found on an image, as far as it is known where fibres end on it."""
-    with recorded() as courses:
+    with benchmark.recorded() as traced:
         cases = benchmark.cases(find_fibres(image), lines)
     found = []
     for case in cases:
         if set(case.fibre.doubts) - benchmark.OWN:
             continue
-        scene, course, _ = next(each for each in courses if each[2].values == case.fibre.signs)
-        strip = joint.strip_of(scene, course)
+        own = benchmark.of_fibre(traced, case.fibre)
+        strip = learned_joint.strip_of(own.scene, own.course)
         if strip is None:
             continue
-        ends = ends_on(course, points, len(strip.where), right=case.right)
+        ends = ends_on(own.course, points, len(strip.where), right=case.right)
         if ends is not None:
-            found.append((scene, course, ends))
+            found.append((own.scene, own.course, ends))
     return found
 
 
@@ -142,7 +123,7 @@ def from_pairs(seed: int) -> list[Known]:
         for scene, course, ends in found:
             if ends.any() and apart * view.noise / again.noise < TOLD_APART:
                 continue
-            strip = joint.strip_of(*retaken(scene, course, taken))
+            strip = learned_joint.strip_of(*retaken(scene, course, taken))
             if strip is not None and len(strip.where) == len(ends):
                 known.append(Known(strip, ends, seed))
     return known
@@ -184,7 +165,7 @@ def from_other(seed: int) -> list[Known]:
         lines = [each.line_px for each in truths]
     return [
         Known(strip, ends, seed) for scene, course, ends in found_on(image, lines, points)
-        if (strip := joint.strip_of(scene, course)) is not None
+        if (strip := learned_joint.strip_of(scene, course)) is not None
     ]  # fmt: skip
 
 
@@ -230,7 +211,7 @@ def loaded(folder: Path) -> list[Known]:
         with np.load(file) as kept:
             counts = kept["counts"]
             stops = np.cumsum(counts)[:-1]
-            levels = np.split(kept["levels"], joint.STRIDE * stops)
+            levels = np.split(kept["levels"], learned_joint.STRIDE * stops)
             where, ends = np.split(kept["where"], stops), np.split(kept["ends"], stops)
             facts, seeds = kept["facts"], kept["seeds"]
         known += [

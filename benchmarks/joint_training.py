@@ -1,4 +1,4 @@
-"""Learns the network of `cosmic.vico.core.vision.joint` from the strips of `joint_strips`.
+"""Learns the network of `cosmic.vico.core.vision.learned_joint` from the strips of `joint_strips`.
 
 `python -m benchmarks.joint_training FOLDER` reads the strips of a folder and writes the weights to
 where the program reads them. It needs `jax`, which nothing else here does.
@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks import fibre_pairs
 from benchmarks.joint_strips import Known, loaded
-from cosmic.vico.core.vision import joint
+from cosmic.vico.core.vision import learned_joint
 
 CHANNELS, FACTS, WHOLE, TAPS = 48, 4, 32, 5
 COLUMNS = 8192
@@ -37,7 +37,7 @@ Batch = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 def first_weights(rng: np.random.Generator) -> dict[str, np.ndarray]:
     """Return weights to begin with."""
     shapes = {
-        "first": (TAPS + 1, joint.ROWS + 2, CHANNELS),
+        "first": (TAPS + 1, learned_joint.ROWS + 2, CHANNELS),
         "second": (TAPS, CHANNELS, CHANNELS),
         "third": (TAPS, CHANNELS, CHANNELS),
         "fourth": (TAPS, CHANNELS, CHANNELS),
@@ -57,8 +57,8 @@ def first_weights(rng: np.random.Generator) -> dict[str, np.ndarray]:
 
 def batch_of(known: Sequence[Known], length: int, rng: np.random.Generator | None) -> Batch:
     """Return strips of one length, turned and lit at random if there is a generator."""
-    answers = length // joint.STRIDE
-    levels = np.zeros((len(known), length, joint.ROWS + 2), np.float32)
+    answers = length // learned_joint.STRIDE
+    levels = np.zeros((len(known), length, learned_joint.ROWS + 2), np.float32)
     where = np.zeros((len(known), answers), bool)
     ends = np.full((len(known), answers), -1, np.int8)
     for row, each in enumerate(known):
@@ -68,7 +68,7 @@ def batch_of(known: Sequence[Known], length: int, rng: np.random.Generator | Non
             if rng is not None:
                 first = int(rng.integers(0, len(each.ends) - answers + 1))
         part = slice(first, first + answers)
-        values = each.strip.levels[joint.STRIDE * first :][:length].astype(np.float32)
+        values = each.strip.levels[learned_joint.STRIDE * first :][:length].astype(np.float32)
         seen, there = each.strip.where[part], each.ends[part]
         if rng is not None:
             values, seen, there = varied(values, seen, there, rng)
@@ -83,12 +83,12 @@ def varied(
     """Return a strip seen from another end or side, and with gloss along it."""
     if rng.integers(0, 2):
         values, seen, there = values[::-1].copy(), seen[::-1], there[::-1]
-    rows = slice(0, joint.ROWS)
+    rows = slice(0, learned_joint.ROWS)
     if rng.integers(0, 2):
-        values[:, rows] = values[:, joint.ROWS - 1 :: -1].copy()
-        values *= joint.MIRRORED
+        values[:, rows] = values[:, learned_joint.ROWS - 1 :: -1].copy()
+        values *= learned_joint.MIRRORED
     if rng.integers(0, 3) == 0:
-        wave = joint.PER_WIDTH * float(rng.uniform(2.0, 8.0))
+        wave = learned_joint.PER_WIDTH * float(rng.uniform(2.0, 8.0))
         gloss = fibre_pairs.wandering(rng, len(values), float(rng.uniform(0.0, GLOSS)), wave)
         values[:, rows] *= gloss[:, None]
     values[:, rows] *= float(rng.uniform(0.95, 1.05))
@@ -110,16 +110,18 @@ def convolved(
 def answers(
     weights: Mapping[str, jax.Array], levels: jax.Array, where: jax.Array, facts: jax.Array
 ) -> jax.Array:
-    """Return what `joint.logits` does of many strips, each seen from one end and side."""
-    on = (levels[:, :: joint.STRIDE] != 0).any(axis=2, keepdims=True).astype(jnp.float32)
+    """Return what `learned_joint.logits` does of many strips, each seen from one end and side."""
+    on = (levels[:, :: learned_joint.STRIDE] != 0).any(axis=2, keepdims=True).astype(jnp.float32)
     # Beyond its end a strip that stands alone has nothing, and no bias either.
     on = jnp.flip(jax.lax.cummax(jnp.flip(on, 1), axis=1), 1)
-    near = jax.nn.relu(convolved(weights, "first", levels, joint.STRIDE)) * on
+    near = jax.nn.relu(convolved(weights, "first", levels, learned_joint.STRIDE)) * on
     near = (near + jax.nn.relu(convolved(weights, "second", near))) * on
     share = where[:, :, None] / jnp.maximum(where.sum(axis=1), 1)[:, None, None]
     mean = (near * share).sum(axis=1)
     variance = (((near - mean[:, None]) ** 2) * share).sum(axis=1)
-    whole = jnp.concatenate([mean, jnp.sqrt(variance + joint.LEAST_VARIANCE), facts], axis=1)
+    whole = jnp.concatenate(
+        [mean, jnp.sqrt(variance + learned_joint.LEAST_VARIANCE), facts], axis=1
+    )
     whole = jax.nn.relu(whole @ weights["whole"] + weights["whole_bias"])
     context = whole @ weights["context"] + weights["context_bias"]
     scale, shift = jnp.split(context[:, None], 2, axis=2)
@@ -205,7 +207,7 @@ def held_back(held: Sequence[Known], weights: dict[str, np.ndarray]) -> str:
     weights = {name: each.astype(np.float32) for name, each in weights.items()}
     for each in held:
         strip = replace(each.strip, levels=each.strip.levels.astype(np.float32))
-        clear.append(float(joint.logits(strip, weights)[strip.where].max()))
+        clear.append(float(learned_joint.logits(strip, weights)[strip.where].max()))
         joined.append(bool((each.ends == 1).any()))
     with_one, without = (np.array(clear)[np.array(joined) == flag] for flag in (True, False))
     if not (len(with_one) and len(without)):
@@ -223,6 +225,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--steps", type=int, default=STEPS)
-    parser.add_argument("--into", type=Path, default=joint.WEIGHTS_FILE)
+    parser.add_argument("--into", type=Path, default=learned_joint.WEIGHTS_FILE)
     asked = parser.parse_args()
     train(loaded(asked.folder), asked.into, asked.steps)

@@ -115,10 +115,10 @@ class Joints:
 def joints(scene: Scene, course: Course) -> Joints:
     """Return the signs along a course that one fibre ends on it and another begins."""
     line = resampled(course.line, 1.0)
-    blur = max(1.0, min(course.blur_px, 0.4 * course.width))
+    blur = course.edge_blur_px
     seen = _seen(course, course.good, line, blur)
     # Where the ground shines through, no edges are seen. What crosses casts a shade beside it.
-    free = _seen(course, _around(course.free, SHADE * course.width / STEP_PX), line, blur)
+    free = _seen(course, unshaded(course), line, blur)
     seen &= free
     if seen.sum() < 6.0 * course.width:
         return Joints(checked=False)
@@ -187,10 +187,10 @@ def _seen(course: Course, flags: Flags, line: Floats, blur: float) -> Flags:
     return np.asarray(good, dtype=np.bool_)
 
 
-def _around(flags: Flags, reach: float) -> Flags:
-    """Return the points with a flag up to some points before and after, beyond the ends too."""
-    size = 2 * int(reach) + 1
-    return np.asarray(minimum_filter1d(flags.astype(np.uint8), size, mode="nearest") > 0)
+def unshaded(course: Course) -> Flags:
+    """Return the points of a course with nothing that crosses it, or shades it, beside them."""
+    size = 2 * int(SHADE * course.width / STEP_PX) + 1
+    return np.asarray(minimum_filter1d(course.free.astype(np.uint8), size, mode="nearest") > 0)
 
 
 def _heights(

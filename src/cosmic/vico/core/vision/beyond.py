@@ -49,7 +49,7 @@ def goes_on(scene: Scene, course: Course, explained: Mask) -> float:
 
 def soft(course: Course) -> float:
     """Return how much less sharp an end is than image and cut make it; from 1 on it counts."""
-    blur = max(1.0, min(course.blur_px, 0.4 * course.width))
+    blur = course.edge_blur_px
     usual = SOFT_BLURS * blur + SOFT_WIDTHS * course.width
     return max([0.0, *(end.soft_px / usual for end in course.ends if end.kind is EndKind.FREE)])
 
@@ -58,7 +58,7 @@ def _rays(scene: Scene, course: Course, at: int, explained: Mask) -> float:
     line = course.line if at else course.line[::-1]
     count = int(np.clip(round(0.6 * course.width), 3, max(3, len(line) // 3)))
     out = line[-1] - line[-1 - min(count, len(line) - 1)]
-    blur = max(1.0, min(course.blur_px, 0.4 * course.width))
+    blur = course.edge_blur_px
     first = 0.5 * course.width + 2.0 * blur + 2.0
     size = max(8.0, 1.2 * course.width)
     radii = first + np.arange(0.0, 2.0 * size)

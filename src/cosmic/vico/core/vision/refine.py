@@ -55,6 +55,11 @@ class Course:
     tilt: Floats = field(default_factory=lambda: np.zeros(0))
     free: Flags = field(default_factory=lambda: np.zeros(0, bool))
 
+    @property
+    def edge_blur_px(self) -> float:
+        """Blur of its edges, at least a pixel, and at most what leaves something between them."""
+        return max(1.0, min(self.blur_px, 0.4 * self.width))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Neighbours:

@@ -33,6 +33,11 @@ def test_a_fibre_below_four_pixels_has_no_such_sign() -> None:
     assert sign(drawn_image([LINE], [3.0], noise=1.0)) == 0.0
 
 
+def test_a_compressed_image_is_not_looked_at() -> None:
+    coded = cv2.imencode(".jpg", touching(14.0), [cv2.IMWRITE_JPEG_QUALITY, 40])[1]
+    assert sign(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE)) == 0.0
+
+
 def test_the_sign_depends_on_neither_depth_nor_side_nor_polarity() -> None:
     image = touching(12.0)
     known = sign(image)

@@ -16,17 +16,15 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d
 
+from cosmic.vico.core.vision.axial import LEAST_WIDTH_PX, unshaded
 from cosmic.vico.core.vision.grey import Floats, Floats32, middle
 from cosmic.vico.core.vision.profiles import Flags, Scene, sample
-from cosmic.vico.core.vision.refine import STEP_PX, Course
+from cosmic.vico.core.vision.refine import Course
 from cosmic.vico.core.vision.smoothing import arc_lengths, directions
 
-WEIGHTS_FILE: Final = Path(__file__).with_name("joint.npz")
+WEIGHTS_FILE: Final = Path(__file__).with_name("learned_joint.npz")
 
-# Narrower, a joint and noise look alike.
-LEAST_WIDTH_PX: Final = 4.0
 # Columns of the strip in a width of the fibre; rows across, and how many widths they reach.
 PER_WIDTH: Final = 8
 ROWS: Final = 23
@@ -34,8 +32,6 @@ REACH: Final = 1.15
 STRIDE: Final = 2
 """The network's answers are so many columns apart."""
 FEWEST_COLUMNS: Final = 6 * PER_WIDTH
-# Widths beside what crosses a fibre that its shade may reach.
-SHADE: Final = 1.0
 LOWEST, HIGHEST = -1.0, 2.0
 """What stands out is cut off there, in multiples of the fibre's contrast: glare, and dirt."""
 MOST_TURNED: Final = 1.5
@@ -94,11 +90,8 @@ def strip_of(scene: Scene, course: Course) -> Strip | None:
         return None
     raw = _levels(scene, course, s, count)
     at = (np.arange(count) + 0.5) / count * s[-1]
-    size = 2 * int(SHADE * width / STEP_PX) + 1
-    around = minimum_filter1d(course.free.astype(np.uint8), size, mode="nearest")
-    free = np.interp(at, s, around.astype(np.float64)) > 0.99
-    blur = max(1.0, min(course.blur_px, 0.4 * width))
-    skip = 0.75 * width + 3.0 * blur
+    free = np.interp(at, s, unshaded(course).astype(np.float64)) > 0.99
+    skip = 0.75 * width + 3.0 * course.edge_blur_px
     where = (free & (at > skip) & (at < s[-1] - skip)).reshape(-1, STRIDE).all(axis=1)
     if where.sum() * STRIDE < FEWEST_COLUMNS // 2:
         return None
