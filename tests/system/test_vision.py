@@ -17,6 +17,7 @@ from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import MoveCancelled
 from cosmic.twin.scene import Scene
+from cosmic.vico.api import find_fibres
 from cosmic.vico.core.camera_thread import CameraThread
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.recording.reading import open_image_recording
@@ -28,6 +29,8 @@ Floats = npt.NDArray[np.float64]
 
 NEAR_UM = 5.0
 HEIGHT_UM = 50.0
+JAW_PX = 30.0
+"""Narrower is a fibre, in these images."""
 
 
 @dataclass
@@ -196,6 +199,25 @@ def test_the_tips_are_seen_where_stages_and_calibration_expect_them(lab: Lab) ->
     assert tip.name == "right"
     assert tip.certain
     assert tip.point_px == pytest.approx(lab.tip_px(), abs=1.5)
+
+
+def test_jaws_are_no_fibres_where_the_calibration_has_them(lab: Lab) -> None:
+    lower(lab)
+    camera = lab.rig.vico.camera()
+    image = camera.next_image()
+    assert sum(each.width_px > JAW_PX for each in find_fibres(image.data)) == 2
+    camera.switch("fibres", on=True)
+    try:
+        since = camera.next_image().frame.frame_id
+        wait_until(
+            lambda: camera.analysis is not None and camera.analysis.image.frame.frame_id > since
+        )
+        assert camera.analysis is not None
+        widths_px = [each.width_px for each in camera.analysis.fibres]
+    finally:
+        camera.switch("fibres", on=False)
+    assert widths_px
+    assert max(widths_px) < JAW_PX
 
 
 # ------------------------------------------------------------------ calibrating

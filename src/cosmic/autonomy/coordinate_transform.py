@@ -30,13 +30,20 @@ from cosmic.vico.api.coordinate_transform import (
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import PixelMap
 from cosmic.vico.core.tool_settings import ToolSettings, tool_mistakes
-from cosmic.vico.core.vision.algorithms import FindTips, FindTools, TrackHeldFibres
+from cosmic.vico.core.vision.algorithms import (
+    FindFibres,
+    FindTips,
+    FindTools,
+    TrackHeldFibres,
+)
 from cosmic.vico.core.vision.tool_types import ExpectedTool
 
 logger = logging.getLogger(__name__)
 
 SOURCE: Final = "click"
 REACH_PX: Final = 40.0
+LEAST_GAP_PX: Final = 3.0
+"""Jaws nearer to each other are one body on an image."""
 
 
 class PlatformTransform(CoordinateTransform):
@@ -193,6 +200,13 @@ class PlatformTransform(CoordinateTransform):
 
     def expected_tools(self, image: CameraImage) -> Mapping[str, ExpectedTool]:
         """Return where the tips should be on an image; those that cannot be told are missing."""
+        return self._expected(image, any_map=False)
+
+    def expected_bodies(self, image: CameraImage) -> Mapping[str, ExpectedTool]:
+        """Return where tools should be to some pixels: by the map of another tool as well."""
+        return self._expected(image, any_map=True)
+
+    def _expected(self, image: CameraImage, *, any_map: bool) -> Mapping[str, ExpectedTool]:
         positions = image.circumstances.positions
         found: dict[str, ExpectedTool] = {}
         for tool in self._tools.values():
@@ -200,14 +214,27 @@ class PlatformTransform(CoordinateTransform):
             if tip is None:
                 continue
             try:
-                mapped = self.map_of(image, tip[2], tool.name)
+                mapped = self._map_by(image, tip[2], tool.name, any_map=any_map)
             except NotAvailable:
                 continue
             wanted = expected(tool, mapped, tip[:2], positions, REACH_PX)
             width, height = image.size_px
-            if wanted is not None and _inside(wanted.tip_px, width, height):
-                found[tool.name] = wanted
+            if wanted is None or not _inside(wanted.tip_px, width, height):
+                continue
+            is_shut = bool(tool.gap_axis) and wanted.gap_px < LEAST_GAP_PX
+            found[tool.name] = wanted.with_jaws_shut() if is_shut else wanted
         return found
+
+    def _map_by(
+        self, image: CameraImage, height_um: float, tool: str, *, any_map: bool
+    ) -> PixelMap:
+        """Return the map that a tool measured, or else that of any."""
+        try:
+            return self.map_of(image, height_um, tool)
+        except NotAvailable:
+            if not any_map:
+                raise
+        return self.map_of(image, height_um)
 
     def positions(self) -> dict[str, float]:
         """Return where the axes are that are known, in gate coordinates."""
@@ -300,7 +327,9 @@ def join_transform(
     if folder is not None:
         vico.focus_models.keep_in(folder)
     for unit in vico.units.values():
-        for link in map(unit.chain.algorithm, ("tools", "tips", TrackHeldFibres.name)):
-            if isinstance(link, FindTools | FindTips | TrackHeldFibres):
+        for link in map(unit.chain.algorithm, unit.chain.names):
+            if isinstance(link, FindFibres):
+                link.expect = transform.expected_bodies
+            elif isinstance(link, FindTools | FindTips | TrackHeldFibres):
                 link.expect = transform.expected_tools
     vico.transform = transform

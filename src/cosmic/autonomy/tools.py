@@ -49,6 +49,7 @@ def expected(
             tool.width_um / mapped.scale_um_px,
             gap_um / mapped.scale_um_px,
             reach_px,
+            scale_um_px=mapped.scale_um_px,
         )
     except ConfigError:
         return None

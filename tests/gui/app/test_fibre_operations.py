@@ -157,6 +157,8 @@ def test_what_cannot_be_done_with_a_fibre_says_why_and_moves_nothing(
     pixel = fibre_px(window, qtbot)
     menu = hand.menu_at(pixel)
     view = tasks(window).central_view.camera
+    on = {each.name for each in view.camera.algorithms if each.on}
+    assert on >= {"fibres", "tips", "held fibre"}
     menu["Take with left"].hover()
     assert view.mark.line_px is not None
     assert "Take with left" in view.message.text

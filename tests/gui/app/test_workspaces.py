@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QPushButton,
     QScrollArea,
+    QTabBar,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
@@ -254,6 +255,61 @@ def test_a_wide_panel_gets_room_while_it_is_in_front(own: OperatorWindow, qtbot:
     qtbot.waitUntil(lambda: not scrolled.horizontalScrollBar().isVisible())
     own.raise_panel("Tool")
     qtbot.waitUntil(lambda: abs(tool.width() - before_px) < 10)
+
+
+@pytest.mark.parametrize("size", list(SIZES.values())[:2], ids=list(SIZES)[:2])
+def test_no_panel_that_comes_to_the_front_scrolls_sideways(
+    own: OperatorWindow, qtbot: QtBot, size: tuple[int, int]
+) -> None:
+    own.resize(*size)
+    assert own.workspaces is not None
+    for workspace in (each for each in own.workspaces.all if each.middle):
+        choose(own, qtbot, workspace.name)
+        for title in [each.title for each in workspace.placements]:
+            own.raise_panel(title)
+            assert settled(qtbot, partial(sideways, own)) == [], title
+
+
+def sideways(window: QWidget) -> list[str]:
+    """Return the panels that are wider than their place."""
+    areas = window.findChildren(QScrollArea)
+    return [
+        f"{area.widget().objectName() or type(area.widget()).__name__} by {beyond} px"
+        for area in areas
+        if not area.visibleRegion().isEmpty() and (beyond := area.horizontalScrollBar().maximum())
+    ]
+
+
+def test_a_layout_kept_in_a_larger_window_comes_back_in_a_smaller_one(
+    own: OperatorWindow, qtbot: QtBot
+) -> None:
+    own.resize(*SIZES["1366x768"])
+    choose(own, qtbot, HANDLE)
+    own.raise_panel("Recorder")
+    choose(own, qtbot, LOOK)
+    own.raise_panel("Camera")
+    qtbot.waitUntil(own.dock("Camera").isVisible)
+    small = SIZES["1024x600"]
+    own.resize(*small)
+    qtbot.waitUntil(lambda: (own.width(), own.height()) == small)
+    for name in (HANDLE, LOOK, HANDLE):
+        choose(own, qtbot, name)
+        qtbot.wait(100)
+        assert (own.width(), own.height()) == small, name
+        assert settled(qtbot, partial(stale_tabs, own)) == [], name
+
+
+def stale_tabs(window: OperatorWindow) -> list[str]:
+    """Return the tabs in sight of panels that are not there."""
+    bars = window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
+    titles = {each.windowTitle() for each in window.findChildren(QDockWidget) if each.isVisible()}
+    return [
+        f"tabs {names} at {bar.geometry()}"
+        for bar in bars
+        if window.rect().intersects(bar.geometry())
+        and (names := [bar.tabText(row) for row in range(bar.count())])
+        and not titles & set(names)
+    ]
 
 
 def test_a_layout_is_kept_by_name_and_reset(make: Make, qtbot: QtBot, stored: QSettings) -> None:

@@ -10,8 +10,10 @@ from PySide6.QtGui import QColor, QWheelEvent
 from PySide6.QtWidgets import QApplication
 
 from cosmic.frame.gui.theme import State
+from cosmic.vico.core.vision.tool_tips import HeldSeen
 from cosmic.vico.gui.camera_view import CameraView
 from cosmic.vico.gui.levels import OVER_RGB, UNDER_RGB
+from cosmic.vico.gui.seen_layer import fibre_text
 from cosmic.vico.hw.interface import FrameStatus, PixelFormat, Trigger
 from cosmic.vico.hw.sim_camera import DrawnFrame
 from gui.vico.fake_vico import HEIGHT, SETTINGS, WIDTH, Found, Seen, SeenTip
@@ -333,6 +335,36 @@ def test_fibres_found_are_drawn_with_their_measures_and_doubts(qtbot, shown, cam
     assert QColor(*colour_at(shown, line)).saturation() > 100
     click(qtbot, shown.row.found)
     assert QColor(*colour_at(shown, line)).saturation() == 0
+
+
+@pytest.mark.parametrize(
+    ("doubt", "words"),
+    [
+        ("the image's border cuts it off", "goes on out of the image"),
+        ("it runs into something wider", "runs into something wider"),
+    ],
+)
+def test_what_is_seen_in_part_is_given_no_length_of_its_own(qtbot, shown, camera, doubt, words):
+    image = camera.push()
+    cut = Seen(certain=False, doubts=(doubt,))
+    camera.analysis = Found(image, (cut,))
+    qtbot.waitUntil(lambda: shown.view.image is image)
+    text = fibre_text(cut, None)
+    assert text.startswith("over 1034.2 px")
+    assert text.endswith(words)
+    shown.grab()
+    assert [text for _, text in shown.seen.labels] == [f"Fibre, not sure: {doubt}"]
+
+
+def test_a_held_fibre_is_as_long_as_at_the_height_of_its_gripper(qtbot, shown, camera):
+    image = camera.push()  # on the plate, 1.25 um a pixel
+    line = np.column_stack([np.linspace(300.0, 400.0, 50), np.full(50, 250.0)])
+    camera.analysis = Found(image, held=(HeldSeen("left", line, 100.0, 2.0, True, 1.18),))
+    qtbot.waitUntil(lambda: shown.view.image is image)
+    shown.grab()
+    assert [text for _, text in shown.seen.labels] == [
+        "Fibre held by left: 118.0 µm free, +2.0° at the jaws"
+    ]
 
 
 def test_findings_in_an_image_of_another_size_are_not_drawn(qtbot, shown, camera):

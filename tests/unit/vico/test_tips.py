@@ -9,6 +9,7 @@ import pytest
 from cosmic.frame.errors import ConfigError
 from cosmic.twin.settings import shipped_settings
 from cosmic.vico.core.vision.tips import find_gripper, find_probe
+from cosmic.vico.core.vision.tool_tips import find_tool
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen, ToolEnd
 from unit.twin.optics.image_bench import ImageBench
 from unit.vico.tool_images import ToolImage, tool_image
@@ -117,6 +118,22 @@ def test_closed_jaws_and_a_single_jaw_are_reported() -> None:
     assert closed == NotSeen("its jaws cannot be told apart: they are closed, or not in focus")
     single = find_gripper(tool_image(3).image, tool_image(3, gap=40.0).expected)
     assert single == NotSeen("only one of its jaws is seen")
+
+
+@pytest.mark.parametrize("gap", [0.0, 1.0])
+@pytest.mark.parametrize("apart", [0.0, 3.0, 8.0])
+def test_a_gripper_that_is_shut_is_one_body_and_may_hold_something(
+    apart: float, gap: float
+) -> None:
+    drawn = tool_image(3, width=40.0 + apart)
+    shut = replace(tool_image(3, width=20.0).expected, gap_px=gap).with_jaws_shut()
+    found = find_tool(drawn.image, shut)
+    assert isinstance(found, GripperTips)
+    assert found.certain
+    assert found.hold_px == pytest.approx(tuple(drawn.hold), abs=1.0)
+    narrow = find_tool(tool_image(3, width=30.0).image, shut)
+    assert isinstance(narrow, GripperTips)
+    assert any("and should be 4" in each for each in narrow.doubts)
 
 
 def test_a_tip_off_the_image_or_far_from_where_it_should_be_is_not_seen() -> None:

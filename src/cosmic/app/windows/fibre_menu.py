@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 USUAL_FORCE_UN: Final = 50.0
 _FIBRES: Final = "fibres"
+_FOUND: Final = (_FIBRES, "tips", "held fibre")
 
 
 def _nothing() -> None:
@@ -180,9 +181,11 @@ class FibreOperations(QObject):
         return any(each.name == _FIBRES and each.on for each in view.camera.algorithms)
 
     def find(self, view: CameraView, *, on: bool) -> None:
-        """Have fibres found on the images of a camera, or not."""
+        """Have fibres, tips and what is held found on the images of a camera, or not."""
         try:
-            view.camera.switch(_FIBRES, on=on)
+            for each in view.camera.algorithms:
+                if each.name in _FOUND and each.on != on:
+                    view.camera.switch(each.name, on=on)
         except CosmicError as exc:
             view.say(str(exc))
 

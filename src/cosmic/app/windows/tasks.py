@@ -64,7 +64,7 @@ _LEFT: Final = Area.LeftDockWidgetArea
 _RIGHT: Final = Area.RightDockWidgetArea
 _FORMULA: Final = "force/calculated"
 _COACH_PX: Final = 17 * STEP_PX
-_WIDE_PX: Final = 47 * STEP_PX
+_WIDE_PX: Final = 49 * STEP_PX
 WATCH_MS: Final = 500
 
 

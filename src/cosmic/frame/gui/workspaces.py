@@ -89,7 +89,7 @@ class _Kept:
     panels: tuple[str, ...]
 
 
-MOST_PART: Final = 3.25
+MOST_PART: Final = 2.6
 """Times as wide as a panel the window is at least where that is given more room."""
 
 
@@ -277,6 +277,7 @@ class Workspaces(QObject):
 
     def _show(self, name: str) -> None:
         window, workspace, docks = self._window, self._known[name], self._docks.values()
+        size = window.size()
         window.setUpdatesEnabled(False)
         self._laying = True
         self._current = name
@@ -288,8 +289,10 @@ class Workspaces(QObject):
         middle = window.centralWidget()
         if middle is not None:
             middle.setVisible(workspace.middle)
+        self._lay_out()  # else tabs of the workspace before stay where they were
         kept = self._states.get(name)
-        # Qt brings a layout back at the size it was kept at, and makes the window as large.
+        # Qt brings a layout back at the size it was kept at, and makes the window as large; it
+        # may be larger than the screen by now.
         self._altered = kept is not None and window.restoreState(kept.state, self._version)
         for title, dock in self._docks.items():
             if kept is not None and title not in kept.panels and not dock.isFloating():
@@ -300,8 +303,16 @@ class Workspaces(QObject):
             self._altered = False
             self._arrange(workspace)
         self._laying = False
+        self._lay_out()  # else the least size is still that of the layout kept
+        window.resize(size)
         window.setUpdatesEnabled(True)
         QTimer.singleShot(0, self, self.fit)
+
+    def _lay_out(self) -> None:
+        layout = self._window.layout()
+        if layout is not None:
+            layout.invalidate()
+            layout.activate()
 
     def _arrange(self, workspace: Workspace) -> None:
         window, docks = self._window, self._docks

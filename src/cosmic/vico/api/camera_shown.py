@@ -79,14 +79,15 @@ class Seen:
     def of(cls, newest: Analysis) -> Self:
         """Return what is shown of the newest analysis."""
         fibres, tips = newest.results.get("fibres"), newest.results.get("tips")
-        held = newest.results.get("held fibre")
+        tracks = newest.results.get("held fibre")
+        held = _held(tracks) if isinstance(tracks, Mapping) else ()
         return cls(
             newest.image,
-            fibres if isinstance(fibres, tuple) else (),
+            _loose(fibres, held) if isinstance(fibres, tuple) else (),
             tuple(each for each in tips if isinstance(each, TipSeen))
             if isinstance(tips, tuple)
             else (),
-            _held(held) if isinstance(held, Mapping) else (),
+            held,
             MappingProxyType(dict(newest.results)),
         )
 
@@ -96,6 +97,15 @@ def _held(tracks: Mapping[str, object]) -> tuple[HeldSeen, ...]:
 
     found = (held_seen(name, track) for name, track in tracks.items())
     return tuple(each for each in found if each is not None)
+
+
+def _loose(fibres: tuple["Fibre", ...], held: Sequence[HeldSeen]) -> tuple["Fibre", ...]:
+    """Return the fibres that are not shown as held ones."""
+    if not held:
+        return fibres
+    from cosmic.vico.core.vision.tool_bodies import without_held
+
+    return without_held(fibres, [each.line_px for each in held])
 
 
 def links_shown(states: Sequence[LinkState], newest: Analysis | None) -> tuple[LinkShown, ...]:

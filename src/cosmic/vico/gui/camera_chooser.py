@@ -24,7 +24,7 @@ class CameraChooser(QWidget):
         super().__init__(parent)
         self._vico, self._name = vico, name
         self.box = tipped(QComboBox(), "The camera that takes the images shown here")
-        self.box.setMinimumContentsLength(10)
+        self.box.setMinimumContentsLength(6)
         self.box.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )

@@ -180,12 +180,12 @@ class CameraView(QWidget):
     def _make_drawer(self) -> QScrollArea:
         content = QWidget()
         column = QVBoxLayout(content)
-        column.setContentsMargins(0, 0, STEP_PX // 2, 0)
+        column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(STEP_PX // 2)
         for title, widgets in (
             ("Contrast", (self.contrast,)),
-            ("Camera", (self.chooser, self.form.panel)),
             ("Machine vision", (self.chain, self.correct)),
+            ("Camera", (self.chooser, self.form.panel)),
         ):
             group = QGroupBox(title)
             inner = QVBoxLayout(group)

@@ -17,6 +17,7 @@ from cosmic.vico.gui.levels import BINS, Histogram, Levels
 
 HEIGHT_PX = 10 * STEP_PX
 FOOT_PX = 16
+FIVE_DIGITS_PX: Final = 6 * STEP_PX
 
 
 class HistogramPlot(QWidget):
@@ -127,6 +128,7 @@ class ContrastPanel(QWidget):
         self.share.setFont(number_font())
         self._build()
         for field in (self.low, self.high):
+            field.setMinimumWidth(FIVE_DIGITS_PX)
             field.committed.connect(self._on_typed)
         self.once.clicked.connect(self.stretch)
         self.auto.toggled.connect(self._on_auto)

@@ -15,6 +15,8 @@ from cosmic.vico.gui.ink import GREEN, HALO, ORANGE, SKY, WHITE, label, pen, str
 from cosmic.vico.gui.texts import length_text
 
 NOT_SURE: Final = "not sure"
+OUT_OF_SIGHT: Final = "goes on out of the image"
+BEHIND: Final = "runs into something wider"
 MOST_POINTS: Final = 150
 
 
@@ -22,8 +24,22 @@ def fibre_text(fibre: Fibre, scale_um_px: float | None) -> str:
     """Return the label of a fibre: length, width, curl, and whether that is certain."""
     length = length_text(fibre.length_px, scale_um_px)
     width = length_text(fibre.width_px, scale_um_px)
+    cut_off = "" if fibre.certain else _cut_off(fibre)
+    if cut_off:
+        return f"over {length}, width {width}\n{cut_off}"
     words = f"{length}, width {width}\ncurl {fibre.curl:.3f}"
     return words if fibre.certain else f"{words}, {NOT_SURE}"
+
+
+def _cut_off(fibre: Fibre) -> str:
+    """Return what hides an end of a fibre; empty where both are seen."""
+    # Not at the top: it loads scipy, which a window without fibres need not.
+    from cosmic.vico.core.vision.ends import EndKind
+
+    for kind, words in ((EndKind.BORDER, OUT_OF_SIGHT), (EndKind.BODY, BEHIND)):
+        if kind.value in fibre.doubts:
+            return words
+    return ""
 
 
 class SeenLayer(Layer):
@@ -45,7 +61,7 @@ class SeenLayer(Layer):
         for fibre in found.fibres:
             self._paint_fibre(painter, view, fibre, scale)
         for held in found.held:
-            self._paint_held(painter, view, held, scale)
+            self._paint_held(painter, view, held)
         for tip in found.tips:
             self._paint_tip(painter, view, tip)
 
@@ -83,12 +99,11 @@ class SeenLayer(Layer):
         said = "certain" if fibre.certain else f"{NOT_SURE}: " + "; ".join(fibre.doubts)
         self.labels.append((box, f"Fibre, {said}"))
 
-    def _paint_held(
-        self, painter: QPainter, view: CameraImageView, held: HeldSeen, scale: float | None
-    ) -> None:
+    def _paint_held(self, painter: QPainter, view: CameraImageView, held: HeldSeen) -> None:
         colour = SKY if held.certain else ORANGE
         stroke(painter, _path(held.line_px, view), pen(colour, 2.0, dashed=not held.certain))
-        free = f"{length_text(held.length_px, scale)} free, {held.angle_deg:+.1f}° at the jaws"
+        length = length_text(held.length_px, held.scale_um_px)
+        free = f"{length} free, {held.angle_deg:+.1f}° at the jaws"
         text = f"{held.name}: {free}" if held.certain else f"{held.name}: {free}, {NOT_SURE}"
         point = view.to_screen.map(QPointF(*held.line_px[len(held.line_px) // 2]))
         box = label(painter, point, text, colour, QRectF(view.rect()), gap=14.0, taken=self._taken)

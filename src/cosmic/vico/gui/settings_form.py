@@ -5,10 +5,10 @@ from dataclasses import replace
 from typing import Final
 
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QWidget
 
 from cosmic.frame.errors import CosmicError
-from cosmic.frame.gui.build import push_button, retip, tipped
+from cosmic.frame.gui.build import push_button, retip, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.task_watch import TaskWatch
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
@@ -52,7 +52,7 @@ class SettingsForm(QObject):
         self.gain = SliderField("Gain", "dB", caption="Gain")
         self.rate = SliderField("Frames a second", "Hz")
         self.binning = tipped(QComboBox(), "Pixels binned into one, in each direction")
-        self.pixel_format = tipped(QComboBox(), "How a pixel is coded")
+        self.pixel_format = tipped(QComboBox(), "Pixel format: how a pixel is coded")
         self.trigger = tipped(QComboBox(), "What starts an exposure")
         self.shoot = push_button("Trigger", "Take one image now")
         self.full_sensor = push_button("Full sensor", "Read the whole sensor")
@@ -72,21 +72,23 @@ class SettingsForm(QObject):
         grid = QGridLayout(self.panel)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(STEP_PX // 2)
-        rows: tuple[tuple[str, QWidget, QPushButton | None], ...] = (
-            ("Rate", self.rate, None),
-            ("Binning", self.binning, None),
-            ("Pixel format", self.pixel_format, None),
-            ("Trigger", self.trigger, self.shoot),
-            ("Region", self.roi_text, self.full_sensor),
+        rows: tuple[tuple[str, QWidget], ...] = (
+            ("Rate", self.rate),
+            ("Binning", self.binning),
+            ("Format", self.pixel_format),
+            ("Trigger", self.trigger),
+            ("Region", self.roi_text),
         )
-        for number, (caption, widget, button) in enumerate(rows):
+        for number, (caption, widget) in enumerate(rows):
             label = QLabel(caption)
             label.setProperty("role", "dim")
             grid.addWidget(label, number, 0)
-            grid.addWidget(widget, number, 1, 1, 2 if button is None else 1)
-            if button is not None:
-                grid.addWidget(button, number, 2)
-        grid.addWidget(self.reason, len(rows), 0, 1, 3)
+            grid.addWidget(widget, number, 1)
+        buttons, row = tight_row(STEP_PX // 2)
+        row.addWidget(self.shoot, 1)
+        row.addWidget(self.full_sensor, 1)
+        grid.addWidget(buttons, len(rows), 0, 1, 2)
+        grid.addWidget(self.reason, len(rows) + 1, 0, 1, 2)
         grid.setColumnStretch(1, 1)
         self.reason.hide()
 

@@ -33,7 +33,7 @@ class SliderField(QWidget):
         self.field = AmountField(name, unit)
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setRange(0, TICKS)
-        self.slider.setMinimumWidth(6 * STEP_PX)
+        self.slider.setMinimumWidth(3 * STEP_PX)
         self.slider.setAccessibleName(name)
         self._low, self._high = 0.0, 1.0
         self._name, self._whole = name, 0.0

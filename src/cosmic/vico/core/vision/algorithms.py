@@ -126,16 +126,28 @@ class Sharpness:
 
 
 class FindFibres:
-    """Every fibre on the image; the result is a tuple of `Fibre`."""
+    """Every fibre on the image; the result is a tuple of `Fibre`.
+
+    Attributes
+    ----------
+    expect : callable or None
+        Tells from an image where the tools should be on it: what lies there is no fibre.
+    """
 
     name = "fibres"
+
+    def __init__(self) -> None:
+        self.expect: Expect | None = None
 
     def run(self, image: CameraImage, results: Results) -> object:  # noqa: ARG002
         """Find them."""
         # Not at the top: it loads OpenCV and scipy, which a window without it need not.
         from cosmic.vico.core.vision.finding import find_fibres
+        from cosmic.vico.core.vision.tool_bodies import without_tools
 
-        return tuple(find_fibres(grey(image.data)))
+        found = find_fibres(grey(image.data))
+        tools = self.expect(image) if self.expect is not None else {}
+        return without_tools(found, tools.values())
 
 
 class TrackFibre:
@@ -288,7 +300,7 @@ class TrackHeldFibres:
         from cosmic.vico.core.vision.held_tracking import HeldFibreTracker
 
         expected = self.expect(image) if self.expect is not None else {}
-        grippers = {name: tool for name, tool in expected.items() if tool.gap_px > 0.0}
+        grippers = {name: tool for name, tool in expected.items() if tool.grips}
         if not grippers:
             return Unavailable(NO_GRIPPER)
         data = grey(image.data)

@@ -23,8 +23,7 @@ from cosmic.vico.core.vision.joining import Strand
 from cosmic.vico.core.vision.profiles import Scene
 from cosmic.vico.core.vision.refine import Neighbours, refine
 from cosmic.vico.core.vision.relief import level_step
-from cosmic.vico.core.vision.tips import find_gripper
-from cosmic.vico.core.vision.tool_tips import HeldSeen
+from cosmic.vico.core.vision.tool_tips import HeldSeen, find_jaws
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen
 from cosmic.vico.core.vision.tracking import TrackState
 from cosmic.vico.hw.interface import Pixels
@@ -64,6 +63,8 @@ class HeldTrack:
         By how much the tip went on since the frame before; 0 after one on which it was lost.
     reason : str
         Why it is lost or not sure.
+    scale_um_px : float or None
+        Size of a pixel at the height of the gripper; None where nobody knows.
     """
 
     state: TrackState
@@ -72,6 +73,7 @@ class HeldTrack:
     tip_std_px: float | None = None
     velocity_px: Pair = (0.0, 0.0)
     reason: str = ""
+    scale_um_px: float | None = None
 
 
 def held_seen(name: str, track: object) -> HeldSeen | None:
@@ -80,7 +82,14 @@ def held_seen(name: str, track: object) -> HeldSeen | None:
         return None
     shape = track.shape
     certain = track.state is TrackState.FOUND
-    return HeldSeen(name, shape.line_px, shape.length_px, shape.clamps[0].angle_deg, certain)
+    return HeldSeen(
+        name,
+        shape.line_px,
+        shape.length_px,
+        shape.clamps[0].angle_deg,
+        certain,
+        scale_um_px=track.scale_um_px,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,7 +137,10 @@ class HeldFibreTracker:
 
     def follow(self, image: Pixels, expected: ExpectedTool) -> HeldTrack:
         """Look for it on the next frame; `expected` is where the gripper should be on it."""
-        found = find_gripper(image, expected)
+        return replace(self._followed(image, expected), scale_um_px=expected.scale_um_px)
+
+    def _followed(self, image: Pixels, expected: ExpectedTool) -> HeldTrack:
+        found = find_jaws(image, expected)
         if isinstance(found, NotSeen):
             return self._lost(f"the gripper: {found.reason}")
         left, top, right, bottom = self._box(image, found)

@@ -28,6 +28,8 @@ LARGEST_STD_PX: Final = 0.5
 JAW_TOLERANCE: Final = 0.05
 PROBE_TOLERANCE: Final = 0.15
 WIDTH_TOLERANCE_PX: Final = 1.0
+HELD_PART: Final = 0.25
+"""Of the width of a gripper that is shut: what it holds may be so thick."""
 LARGEST_LEAN_DEG: Final = 8.0
 LARGEST_SKEW_DEG: Final = 2.0
 FILLED: Final = 0.2
@@ -51,6 +53,15 @@ def find_probe(image: Pixels, expected: ExpectedTool) -> ToolEnd | NotSeen:
     if isinstance(body, NotSeen):
         return body
     return _tool_end(frame, body, expected, inner_is_high=False)
+
+
+def find_shut_gripper(image: Pixels, expected: ExpectedTool) -> GripperTips | NotSeen:
+    """Find a gripper that looks like one body: its hold is the middle of the front."""
+    found = find_probe(image, expected)
+    if isinstance(found, NotSeen):
+        return found
+    std = found.std_px
+    return GripperTips(found.tip_px, 0.0, std, std, (found, found), found.doubts)
 
 
 def find_gripper(image: Pixels, expected: ExpectedTool) -> GripperTips | NotSeen:
@@ -147,7 +158,10 @@ def _doubts(body: Body, lean: float, expected: ExpectedTool) -> tuple[str, ...]:
         doubts.append(f"its tip is known to {body.std:.1f} px only")
     share = JAW_TOLERANCE if expected.gap_px > 0.0 else PROBE_TOLERANCE
     tolerance_px = max(WIDTH_TOLERANCE_PX, share * expected.width_px)
-    if not abs(body.width - expected.width_px) <= tolerance_px:
+    wider = body.width - expected.width_px
+    if expected.shut:  # what the jaws hold keeps them apart
+        wider = min(wider, max(0.0, wider - HELD_PART * expected.width_px))
+    if not abs(wider) <= tolerance_px:
         doubts.append(f"it is {body.width:.0f} px wide, and should be {expected.width_px:.0f} px")
     angle_deg = math.degrees(math.atan(abs(lean)))
     if not angle_deg <= LARGEST_LEAN_DEG:

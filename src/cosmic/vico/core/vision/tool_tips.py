@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from cosmic.frame.renamed import Renamed
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.vision.grey import Floats
-from cosmic.vico.core.vision.tips import find_gripper, find_probe
+from cosmic.vico.core.vision.tips import find_gripper, find_probe, find_shut_gripper
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen, ToolEnd
 from cosmic.vico.hw.interface import Pixels
 
@@ -44,6 +44,8 @@ class HeldSeen:
         Its free part.
     angle_deg : float
         At the clamp, from the direction of the gripper.
+    scale_um_px : float or None
+        Size of a pixel at its height, which is not that of the plate; None where nobody knows.
     """
 
     name: str
@@ -51,11 +53,17 @@ class HeldSeen:
     length_px: float
     angle_deg: float
     certain: bool
+    scale_um_px: float | None = None
 
 
 def find_tool(image: Pixels, expected: ExpectedTool) -> Found:
     """Return the tip of a gripper, or of what has no gap."""
-    return (find_gripper if expected.gap_px > 0.0 else find_probe)(image, expected)
+    return find_jaws(image, expected) if expected.grips else find_probe(image, expected)
+
+
+def find_jaws(image: Pixels, expected: ExpectedTool) -> GripperTips | NotSeen:
+    """Return the tip of a gripper, open or shut."""
+    return (find_shut_gripper if expected.shut else find_gripper)(image, expected)
 
 
 def tip_seen(name: str, found: object) -> TipSeen | None:

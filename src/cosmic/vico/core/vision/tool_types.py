@@ -1,7 +1,7 @@
 """Where a tool is expected on the image, and what was seen of it."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from cosmic.frame.errors import ConfigError
 
@@ -26,6 +26,10 @@ class ExpectedTool:
         How much further the second jaw reaches than the first.
     reach_px : float
         How far off all this may be.
+    shut : bool
+        It is a gripper whose jaws touch, or all but: one body as wide as both, without a gap.
+    scale_um_px : float or None
+        Size of a pixel at its height; None where nobody knows.
     """
 
     tip_px: Pair
@@ -34,6 +38,23 @@ class ExpectedTool:
     gap_px: float = 0.0
     reach_px: float = 40.0
     step_px: float = 0.0
+    shut: bool = False
+    scale_um_px: float | None = None
+
+    @property
+    def grips(self) -> bool:
+        """Whether it is a gripper."""
+        return self.shut or self.gap_px > 0.0
+
+    @property
+    def half_px(self) -> float:
+        """From its middle to its side."""
+        return 0.5 * self.gap_px + self.width_px * (1.0 if self.gap_px > 0.0 else 0.5)
+
+    def with_jaws_shut(self) -> "ExpectedTool":
+        """Return what a gripper looks like whose gap is too narrow to be seen."""
+        width_px = 2.0 * self.width_px + self.gap_px
+        return replace(self, width_px=width_px, gap_px=0.0, step_px=0.0, shut=True)
 
     def __post_init__(self) -> None:
         """Refuse what cannot be looked for."""
