@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from cosmic.frame.gui.application_events import ApplicationEvents
+from cosmic.frame.gui.application_events import ApplicationEvents, at_one_go
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.stop_key import StopKeyFilter
 
@@ -229,3 +229,16 @@ def test_escape_belongs_to_a_plain_line_once_it_was_typed_into(
 def test_what_is_no_key_is_refused(qapp: QApplication, name: str) -> None:
     with pytest.raises(ValueError, match="is not the name of a key"):
         StopKeyFilter(qapp, name)
+
+
+def test_the_key_stops_after_a_change_at_one_go_even_one_that_failed(
+    qtbot: QtBot, form: QWidget, stops: list[str]
+) -> None:
+    with at_one_go(form), at_one_go(form):
+        form.resize(300, 200)
+    qtbot.keyClick(form, F12)
+    assert stops == ["F12"]
+    with pytest.raises(ZeroDivisionError), at_one_go(form):
+        raise ZeroDivisionError
+    qtbot.keyClick(form, F12)
+    assert stops == ["F12", "F12"]

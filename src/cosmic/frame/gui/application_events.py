@@ -1,11 +1,12 @@
 """The one filter on all events of the program, which asks only those who wait for an event."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
-from PySide6.QtCore import QEvent, QObject, QTimer
+from PySide6.QtCore import QCoreApplication, QEvent, QObject, QTimer
 from PySide6.QtGui import QInputEvent
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 from cosmic.frame.overrides import override
 
@@ -13,6 +14,23 @@ Handler = Callable[[QObject, QEvent], bool]
 """Looks at an event before its receiver does; True keeps it from there."""
 
 _NAME: Final = "applicationEvents"
+
+
+@contextmanager
+def at_one_go(window: QWidget) -> Iterator[None]:
+    """Do something that changes much of a window, and lay it out and paint it at the end.
+
+    All that happens with the filter at rest, while other threads want the interpreter.
+    """
+    app = QApplication.instance()
+    if not isinstance(app, QApplication):
+        yield
+        return
+    with ApplicationEvents.of(app).resting():
+        yield
+        for kind in (QEvent.Type.LayoutRequest, QEvent.Type.UpdateLater):
+            QCoreApplication.sendPostedEvents(None, kind.value)
+        window.repaint()
 
 
 class ApplicationEvents(QObject):
@@ -29,6 +47,7 @@ class ApplicationEvents(QObject):
         self.setObjectName(_NAME)
         self._app = app
         self._handlers: dict[type[QEvent], tuple[tuple[QObject, Handler], ...]] = {}
+        self._resting = 0
 
     @staticmethod
     def of(app: QApplication) -> "ApplicationEvents":
@@ -59,8 +78,22 @@ class ApplicationEvents(QObject):
         if not self._handlers:
             self._app.removeEventFilter(self)
 
+    @contextmanager
+    def resting(self) -> Iterator[None]:
+        """Ask nobody meanwhile: for what is done in one go and sends events that no hand caused.
+
+        No event loop may run in it.
+        """
+        self._resting += 1
+        self._app.removeEventFilter(self)
+        try:
+            yield
+        finally:
+            self._resting -= 1
+            self._begin()
+
     def _begin(self) -> None:
-        if self._handlers:
+        if self._handlers and not self._resting:
             self._app.installEventFilter(self)
 
     @override

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from cosmic.frame.gui.application_events import at_one_go
 from cosmic.frame.gui.dock import PanelDock
 from cosmic.frame.gui.drawer import Drawer
 from cosmic.frame.gui.keys_dialog import KeyList, KeysDialog
@@ -404,10 +405,11 @@ class CosmicServerGui(QMainWindow):
         app = QApplication.instance()
         if not isinstance(app, QApplication):
             return
-        apply_theme(app, "light" if name == "light" else "dark")
-        self._store.save_theme(self.theme)
-        self._menus.show_theme(self.theme)
-        self.theme_changed.emit(self.theme)
+        with at_one_go(self):
+            apply_theme(app, "light" if name == "light" else "dark")
+            self._store.save_theme(self.theme)
+            self._menus.show_theme(self.theme)
+            self.theme_changed.emit(self.theme)
 
     def reset_layout(self) -> None:
         """Put all panels back to where they are at a first start."""

@@ -9,6 +9,8 @@ from PySide6.QtCore import QByteArray, QObject, QSettings, QSize, Qt, QTimer, Si
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QDockWidget, QMainWindow
 
+from cosmic.frame.gui.application_events import at_one_go
+
 Area = Qt.DockWidgetArea
 _GROUP: Final = "workspaces"
 _LAYOUT: Final = f"{_GROUP}/layout"
@@ -164,8 +166,10 @@ class Workspaces(QObject):
         if name == self._current or name not in self._known:
             return
         self._keep()
-        self._show(name)
-        self.chosen.emit(name)
+        with at_one_go(self._window):
+            self._show(name)
+            self.chosen.emit(name)
+            self.fit()
 
     def bring(self, title: str) -> None:
         """Show a panel in front, in the workspace that has a place for it."""
