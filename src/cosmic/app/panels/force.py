@@ -51,7 +51,7 @@ from cosmic.mico.gui.mico_widget import MicoWidget
 T = TypeVar("T")
 
 READOUT_MS: Final = 100
-CHART_MS: Final = 40
+CHART_MS: Final = 33
 OLD_S: Final = 1.0
 REFUSAL_MS: Final = 12_000
 """So long a refusal is shown."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from cosmic.daqco.core.chunk import DataChunk
 
-DISPLAY_S: Final = 0.05
+DISPLAY_S: Final = 0.032
 """How much time of the wall a piece covers at least."""
 
 
