@@ -17,7 +17,7 @@ from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.results.panel import ResultsPanel
-from cosmic.app.results.sessions import read_about
+from cosmic.app.results.sessions import SessionFolder, read_about
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.recording_file import RecordingFile
 from cosmic.daqco.core.recording_format import AxisPosition, RecordedEvent, RecordingHeader
@@ -428,3 +428,11 @@ def test_nothing_of_a_recording_is_cut_off(
     assert panel.size().toTuple() == size
     assert clipped(panel) == []
     assert overlapping(panel) == []
+
+
+def test_the_folder_of_a_session_goes_along_with_that_of_all(tmp_path: Path) -> None:
+    folder = SessionFolder()
+    folder.home = tmp_path / "sessions"
+    made = folder()
+    assert made.is_dir()
+    assert made.parent == tmp_path / "sessions"

@@ -36,9 +36,20 @@ class SessionFolder:
 
     def __init__(self, now: Callable[[], datetime] = datetime.now) -> None:
         place = QStandardPaths.StandardLocation.DocumentsLocation
-        self.home = Path(QStandardPaths.writableLocation(place)) / "CoSMic" / "sessions"
-        self._folder = self.home / f"{now():%Y-%m-%d_%H-%M}"
+        home = Path(QStandardPaths.writableLocation(place)) / "CoSMic" / "sessions"
+        self._folder = home / f"{now():%Y-%m-%d_%H-%M}"
+        self._home = home
         self.on_made: Callable[[Path], object] | None = None
+
+    @property
+    def home(self) -> Path:
+        """Where the folders of all sessions are; who sets it moves this one there."""
+        return self._home
+
+    @home.setter
+    def home(self, home: Path) -> None:
+        self._home = home
+        self._folder = home / self._folder.name
 
     def __call__(self) -> Path:
         """Return it, made now if need be; raises `OSError`."""
