@@ -248,6 +248,7 @@ def test_a_wide_panel_gets_room_while_it_is_in_front(own: OperatorWindow, qtbot:
     own.workspaces.choose(HANDLE)
     tool, wide = own.dock("Tool"), own.dock("Trajectories")
     qtbot.waitUntil(lambda: tool.isVisible() and own.width() == 1366)
+    qtbot.waitUntil(lambda: tool.width() == round(0.165 * 1366))
     before_px = tool.width()
     own.raise_panel("Trajectories")
     qtbot.waitUntil(lambda: wide.width() > before_px)
@@ -300,16 +301,120 @@ def test_a_layout_kept_in_a_larger_window_comes_back_in_a_smaller_one(
 
 
 def stale_tabs(window: OperatorWindow) -> list[str]:
-    """Return the tabs in sight of panels that are not there."""
+    """Return the tabs in sight of panels that are not there, and panels behind others without."""
     bars = window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
-    titles = {each.windowTitle() for each in window.findChildren(QDockWidget) if each.isVisible()}
+    docks = [each for each in window.findChildren(QDockWidget) if each.isVisible()]
+    titles = {each.windowTitle() for each in docks}
+    in_sight = [bar for bar in bars if bar.isVisible() and window.rect().contains(bar.geometry())]
+    named = [[bar.tabText(row) for row in range(bar.count())] for bar in in_sight]
+    offered = {name for names in named for name in names}
+    grouped = {each.windowTitle() for each in docks if window.tabifiedDockWidgets(each)}
     return [
-        f"tabs {names} at {bar.geometry()}"
-        for bar in bars
-        if window.rect().intersects(bar.geometry())
-        and (names := [bar.tabText(row) for row in range(bar.count())])
-        and not titles & set(names)
+        *(f"tabs of nothing: {names}" for names in named if names and not titles & set(names)),
+        *(f"{title} has no tab" for title in sorted(grouped - offered)),
     ]
+
+
+def test_panels_that_share_a_place_have_tabs_in_every_workspace(
+    own: OperatorWindow, qtbot: QtBot
+) -> None:
+    assert own.workspaces is not None
+    names = [each.name for each in own.workspaces.all]
+    for name in (HANDLE, SET_UP, *names, *reversed(names)):
+        choose(own, qtbot, name)
+        assert settled(qtbot, partial(stale_tabs, own)) == [], name
+    own.reset_layout()
+    assert settled(qtbot, partial(stale_tabs, own)) == []
+
+
+def test_columns_keep_their_share_when_the_window_changes_its_size(
+    own: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(own, qtbot, SET_UP)
+    for size in ((1366, 768), (1920, 1080), (1024, 600)):
+        own.resize(*size)
+        coach = own.dock("Next step")
+        qtbot.waitUntil(lambda coach=coach, size=size: coach.width() < 0.25 * size[0])
+    own.resize(1366, 768)
+    choose(own, qtbot, HANDLE)
+    own.raise_panel("Trajectories")
+    wide = own.dock("Trajectories")
+    qtbot.waitUntil(lambda: wide.width() > 350)
+    own.resize(1380, 768)
+    qtbot.wait(200)
+    assert wide.width() > 350
+    choose(own, qtbot, LOOK)
+    choose(own, qtbot, HANDLE)
+    qtbot.waitUntil(lambda: wide.width() > 350)
+
+
+def test_a_reset_lasts_and_a_layout_as_at_the_start_can_be_kept(
+    make: Make, qtbot: QtBot, stored: QSettings
+) -> None:
+    window = make(applications=("mico", "daqco", "vico"), hardware=False)
+    spaces = window.workspaces
+    assert spaces is not None
+    spaces.save_as("mine")
+    assert spaces.layouts == ("usual", "mine")
+    choose(window, qtbot, HANDLE)
+    usual = shown(window)
+    window.dock("Next step").hide()
+    spaces.save()
+    window.reset_layout()
+    window.close()
+    again = make(applications=("mico", "daqco", "vico"), hardware=False)
+    choose(again, qtbot, HANDLE)
+    assert shown(again) == usual
+
+
+def test_the_tab_key_goes_to_what_is_in_sight(own: OperatorWindow, qtbot: QtBot) -> None:
+    choose(own, qtbot, SET_UP)
+    own.activateWindow()
+    qtbot.waitUntil(own.isActiveWindow)
+    own.setFocus()
+    met = set()
+    for _ in range(60):
+        qtbot.keyClick(QApplication.focusWidget() or own, Qt.Key.Key_Tab)
+        now = QApplication.focusWidget()
+        assert now is not None
+        dock = holder_of(now)
+        assert dock is None or not dock.visibleRegion().isEmpty(), now.objectName()
+        met.add(now)
+    assert len(met) > 30, "it goes round among a few"
+
+
+def holder_of(widget: QWidget | None) -> QDockWidget | None:
+    while widget is not None and not isinstance(widget, QDockWidget):
+        widget = widget.parentWidget()
+    return widget
+
+
+@pytest.mark.parametrize(("space", "title"), [(HANDLE, "Tool"), (LOOK, "Next step")])
+def test_a_panel_that_floats_is_whole_and_says_its_name(
+    own: OperatorWindow, qtbot: QtBot, space: str, title: str
+) -> None:
+    own.resize(*SIZES["1366x768"])
+    choose(own, qtbot, space)
+    dock = own.dock(title)
+    dock.setFloating(True)
+
+    def cut() -> list[str]:
+        name = next(each for each in dock.findChildren(QLabel) if each.text() == title)
+        needed = name.fontMetrics().horizontalAdvance(title)
+        return [*sideways(dock), *([] if name.width() >= needed else [f"{name.width()} {needed}"])]
+
+    assert settled(qtbot, cut) == []
+    dock.setFloating(False)
+
+
+def test_the_step_of_the_table_is_in_degrees(own: OperatorWindow, qtbot: QtBot) -> None:
+    choose(own, qtbot, HANDLE)
+    tool = tasks(own).tool
+    qtbot.mouseClick(tool.choices["table"], LEFT)
+    assert tool.step.unit == "deg"
+    assert "°" in tool.step.toolTip()
+    qtbot.mouseClick(tool.choices["left"], LEFT)
+    assert tool.step.unit == "um"
 
 
 def test_a_layout_is_kept_by_name_and_reset(make: Make, qtbot: QtBot, stored: QSettings) -> None:

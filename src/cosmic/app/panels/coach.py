@@ -63,6 +63,7 @@ class Coach(QFrame):
         self.off.setCheckable(True)
         self.off.setChecked(str(settings.value(_KEY, "")).lower() == "true")
         self.off.clicked.connect(self._on_off)
+        self._name_off()
         self.words = named(QLabel(), "coachWords")
         self.words.setWordWrap(True)
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
@@ -86,6 +87,11 @@ class Coach(QFrame):
         self._look.timeout.connect(self.look)
         self._look.start()
         self.look()
+
+    def _name_off(self) -> None:
+        is_off = self.off.isChecked()
+        self.off.setText("on" if is_off else "off")
+        self.off.setToolTip("Switch the coach on" if is_off else "Switch the coach off")
 
     @property
     def step(self) -> Step | None:
@@ -116,5 +122,6 @@ class Coach(QFrame):
             self.look()
 
     def _on_off(self) -> None:
+        self._name_off()
         self._settings.setValue(_KEY, "true" if self.off.isChecked() else "false")
         self.look()

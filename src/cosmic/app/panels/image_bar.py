@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QMenu,
@@ -233,8 +233,32 @@ class ImageBar(QWidget):
             self.reported.emit(str(exc))
 
     @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._leave_out()
+
+    def _leave_out(self) -> None:
+        """Where there is no room for all, leave out what stands in Look as well."""
+        spacing, row = STEP_PX // 4, self.layout()
+        if row is None:
+            return
+        margins = row.contentsMargins()
+        left_px = self.width() - margins.left() - margins.right() + spacing
+        items = [row.itemAt(index) for index in range(row.count())]
+        shown = [each for item in items if item is not None and (each := item.widget()) is not None]
+        needed_px = sum(_least_px(each) + spacing for each in shown)
+        for each in (self.light, self.nearer, self.farther, self._exposures, self.fit):
+            each.setVisible(needed_px <= left_px)
+            if needed_px > left_px:
+                needed_px -= _least_px(each) + spacing
+
+    @override
     def sizeHint(self) -> QSize:
         return QSize(max(super().sizeHint().width(), 90 * STEP_PX), BAR_PX)
+
+
+def _least_px(widget: QWidget) -> int:
+    return min(max(widget.minimumSizeHint().width(), widget.minimumWidth()), widget.maximumWidth())
 
 
 def _button(text: str, tip: str) -> QToolButton:

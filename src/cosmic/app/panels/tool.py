@@ -413,7 +413,7 @@ class ToolPanel(QWidget):
     def _show_step(self) -> None:
         usual = USUAL_STEP_DEG if self._unit == "deg" else USUAL_STEP_UM
         self.step.setAccessibleName(f"Step of the pad in {DISPLAY[self._unit]}")
-        self.step.set_value(self._steps.get(self._unit, usual))
+        self.step.set_unit(self._unit, self._steps.get(self._unit, usual))
 
     # Commanding
 

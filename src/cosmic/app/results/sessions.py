@@ -30,33 +30,27 @@ class SessionFolder:
 
     Attributes
     ----------
+    home : Path
+        Where the folders of all sessions are.
     on_made : callable or None
         Called with the folder whenever somebody is about to write there.
     """
 
     def __init__(self, now: Callable[[], datetime] = datetime.now) -> None:
         place = QStandardPaths.StandardLocation.DocumentsLocation
-        home = Path(QStandardPaths.writableLocation(place)) / "CoSMic" / "sessions"
-        self._folder = home / f"{now():%Y-%m-%d_%H-%M}"
-        self._home = home
+        self.home = Path(QStandardPaths.writableLocation(place)) / "CoSMic" / "sessions"
+        self._name = f"{now():%Y-%m-%d_%H-%M}"
+        self._folder: Path | None = None
         self.on_made: Callable[[Path], object] | None = None
-
-    @property
-    def home(self) -> Path:
-        """Where the folders of all sessions are; who sets it moves this one there."""
-        return self._home
-
-    @home.setter
-    def home(self, home: Path) -> None:
-        self._home = home
-        self._folder = home / self._folder.name
 
     def __call__(self) -> Path:
         """Return it, made now if need be; raises `OSError`."""
-        self._folder.mkdir(parents=True, exist_ok=True)
+        folder = self._folder or self.home / self._name
+        folder.mkdir(parents=True, exist_ok=True)
+        self._folder = folder
         if self.on_made is not None:
-            self.on_made(self._folder)
-        return self._folder
+            self.on_made(folder)
+        return folder
 
 
 class ItemKind(StrEnum):

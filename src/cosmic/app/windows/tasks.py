@@ -343,11 +343,16 @@ class TaskLayout(QObject):
             self._gui,
             configured=tuple(self._platform.file.mico.kinds),
             force=self.force is not None,
-            tool=lambda: self.tool.tool.name,
+            tool=self._tool_in_the_image,
             camera=lambda: self.central_view.camera.camera,
             folder=self.folder,
             click=self._try_click,
         ).steps
+
+    def _tool_in_the_image(self) -> str:
+        """Return the chosen tool, or another one where that has no tip to be seen, as the table."""
+        chosen, seen = self.tool.tool.name, tuple(self.central_view.camera.camera.targets)
+        return chosen if chosen in seen or not seen else seen[0]
 
     def _try_click(self) -> None:
         """Show the image, with a click that moves the chosen tool."""

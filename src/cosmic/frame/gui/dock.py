@@ -28,9 +28,9 @@ class _TitleBar(QWidget):
         super().__init__(dock)
         self.setObjectName("dockTitle")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
-        title = QLabel(dock.windowTitle())
+        self._title = title = QLabel(dock.windowTitle())
         title.setFont(ui_font(bold=True))
-        title.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.show_whole(False)
         self._float = _tool_button("❐", "Undock this panel, or dock it again")
         self._float.clicked.connect(self._on_float)
         hide = _tool_button("✕", "Hide this panel; the View menu brings it back")
@@ -43,6 +43,11 @@ class _TitleBar(QWidget):
         for button in (self._float, hide):
             row.addWidget(button)
         row.addWidget(stop)
+
+    def show_whole(self, whole: bool) -> None:
+        """Have room for all of the title, or be as narrow as the column."""
+        policy = QSizePolicy.Policy.Minimum if whole else QSizePolicy.Policy.Ignored
+        self._title.setSizePolicy(policy, QSizePolicy.Policy.Preferred)
 
     def _on_float(self) -> None:
         self._dock.setFloating(not self._dock.isFloating())
@@ -107,7 +112,8 @@ class PanelDock(QDockWidget):
         self._panel = panel
         self._stop = StopButton(stop_key)
         self._stop.hide()
-        self.setTitleBarWidget(_TitleBar(self, self._stop))
+        self._bar = _TitleBar(self, self._stop)
+        self.setTitleBarWidget(self._bar)
         self._banner = _FailedBanner()
         body = named(QWidget(), "dockBody")
         body.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
@@ -147,10 +153,14 @@ class PanelDock(QDockWidget):
 
     def _on_top_level_changed(self, floats: bool) -> None:
         self._stop.setVisible(floats)
+        self._bar.show_whole(floats)
         if floats:
             QTimer.singleShot(0, self, self._fit)
 
     def _fit(self) -> None:
+        if not self.isFloating():
+            return
+        self.resize(self.size().expandedTo(self.sizeHint()))
         fit_to_screen(self)
 
     @override

@@ -87,6 +87,17 @@ class QuantityField(QLineEdit):
         """Unit of `value`."""
         return self._unit
 
+    def set_unit(self, unit: str, value: float) -> None:
+        """Take another unit, and a value in it; an entry under way is given up."""
+        self._unit = unit
+        self._set_reason("")
+        self._good, self._before_commit = value, None
+        self._shown = self._text_of(value)
+        self.setText(self._shown)
+        self.setTextMargins(0, 0, self._unit_width_px(), 0)
+        self._show_tip()
+        self.update()
+
     @property
     def reason(self) -> str:
         """Why the entry is refused; empty when it is not."""

@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
     QMenuBar,
     QMessageBox,
     QStatusBar,
-    QTabBar,
     QWidget,
 )
 
@@ -26,6 +25,7 @@ from cosmic.frame.gui.keys_dialog import KeyList, KeysDialog
 from cosmic.frame.gui.layout_store import LayoutStore
 from cosmic.frame.gui.palette import ThemeName
 from cosmic.frame.gui.screen_fit import DialogFitter, fit_to_screen
+from cosmic.frame.gui.tab_bars import tidy_tab_bars
 from cosmic.frame.gui.theme import STEP_PX, apply_theme, current_palette
 from cosmic.frame.gui.top_bar import TopBar
 from cosmic.frame.gui.wheel_guard import WheelGuard
@@ -162,26 +162,6 @@ class ServerMenus(QObject):
         )
         box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         box.open()
-
-
-def hide_stale_tab_bars(window: QMainWindow) -> None:
-    """Hide the tab bars that belong to no group of docks as it is now.
-
-    Qt 6 keeps the bar of an earlier arrangement visible, over or below the one in use. Of several
-    for one group the one made last is in use.
-    """
-    docks = window.findChildren(QDockWidget)
-    wanted = {
-        frozenset(each.windowTitle() for each in (dock, *window.tabifiedDockWidgets(dock)))
-        for dock in docks
-    }
-    bars = window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
-    for bar in reversed(bars):
-        group = frozenset(bar.tabText(index).replace("&", "") for index in range(bar.count()))
-        if group in wanted:
-            wanted.remove(group)
-        else:
-            bar.hide()
 
 
 Area = Qt.DockWidgetArea
@@ -417,7 +397,7 @@ class CosmicServerGui(QMainWindow):
             self._workspaces.reset()
             return
         self._store.reset(self)
-        hide_stale_tab_bars(self)
+        tidy_tab_bars(self)
 
     def _on_message_clicked(self) -> None:
         in_drawer = self._drawer is not None and LOG_TITLE in self._drawer.titles
@@ -462,7 +442,7 @@ class CosmicServerGui(QMainWindow):
         super().showEvent(event)
 
     def _after_first_show(self) -> None:
-        hide_stale_tab_bars(self)
+        tidy_tab_bars(self)
         self._fit()  # now that the desktop has put its frame round it
         self.windowHandle().screenChanged.connect(self._on_screen_changed)
 
@@ -471,6 +451,22 @@ class CosmicServerGui(QMainWindow):
 
     def _fit(self) -> None:
         fit_to_screen(self)
+
+    @override
+    def focusNextPrevChild(self, next: bool) -> bool:
+        """Go on to what is in sight: Qt takes panels behind others for visible."""
+        first = QApplication.focusWidget()
+        while super().focusNextPrevChild(next):
+            now = QApplication.focusWidget()
+            if now is None or now is first or not self._is_behind(now):
+                return True
+        return False
+
+    def _is_behind(self, widget: QWidget) -> bool:
+        holder: QWidget | None = widget
+        while holder is not None and not isinstance(holder, QDockWidget):
+            holder = holder.parentWidget()
+        return holder is not None and holder.visibleRegion().isEmpty()
 
     @override
     def resizeEvent(self, event: QResizeEvent) -> None:

@@ -10,6 +10,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QDockWidget, QMainWindow
 
 from cosmic.frame.gui.application_events import at_one_go
+from cosmic.frame.gui.tab_bars import is_in_front, tidy_tab_bars
 
 Area = Qt.DockWidgetArea
 _GROUP: Final = "workspaces"
@@ -127,7 +128,6 @@ class Workspaces(QObject):
         self._laying = False
         self._current = ""
         self._layout = str(settings.value(_LAYOUT, USUAL)) or USUAL
-        self._narrow_px: dict[str, int] = {}
 
     def add_dock(self, dock: QDockWidget) -> None:
         """Take a panel in; it is shown where a workspace has a place for it."""
@@ -204,8 +204,14 @@ class Workspaces(QObject):
         self._settings.sync()
 
     def reset(self) -> None:
-        """Put the panels of every workspace back to where they are at a first start."""
+        """Put the panels of every workspace back to where they are at a first start.
+
+        What was kept under a name stays, and can be used again.
+        """
         self._states.clear()
+        self._layout = USUAL
+        self._settings.setValue(_LAYOUT, USUAL)
+        self._settings.remove(f"{_GROUP}/layouts/{USUAL}")
         name, self._current = self._current, ""
         self._show(name)
 
@@ -215,9 +221,9 @@ class Workspaces(QObject):
     def layouts(self) -> tuple[str, ...]:
         """Names of the layouts that were kept."""
         self._settings.beginGroup(f"{_GROUP}/layouts")
-        names = tuple(self._settings.childGroups())
+        names = (name for name in self._settings.childGroups() if name != USUAL)
         self._settings.endGroup()
-        return names
+        return (USUAL, *names)
 
     @property
     def layout_name(self) -> str:
@@ -242,6 +248,7 @@ class Workspaces(QObject):
         self._show(shown)
 
     def _store(self, layout: str) -> None:
+        self._settings.setValue(f"{_GROUP}/layouts/{layout}/kept", True)  # as at a first start, too
         for name, kept in self._states.items():
             key = f"{_GROUP}/layouts/{layout}/{name}"
             self._settings.setValue(key, kept.state)
@@ -293,7 +300,6 @@ class Workspaces(QObject):
         middle = window.centralWidget()
         if middle is not None:
             middle.setVisible(workspace.middle)
-        self._lay_out()  # else tabs of the workspace before stay where they were
         kept = self._states.get(name)
         # Qt brings a layout back at the size it was kept at, and makes the window as large; it
         # may be larger than the screen by now.
@@ -309,6 +315,7 @@ class Workspaces(QObject):
         self._laying = False
         self._lay_out()  # else the least size is still that of the layout kept
         window.resize(size)
+        tidy_tab_bars(window)
         window.setUpdatesEnabled(True)
         QTimer.singleShot(0, self, self.fit)
 
@@ -343,10 +350,9 @@ class Workspaces(QObject):
 
     def _size(self, workspace: Workspace) -> None:
         sized = [each for each in workspace.placements if each.share and each.title in self._docks]
-        room = self._window.width()
         self._window.resizeDocks(
             [self._docks[each.title] for each in sized],
-            [each.width_px(room) for each in sized],
+            [self._width_px(each, workspace) for each in sized],
             Qt.Orientation.Horizontal,
         )
         high = [
@@ -358,10 +364,21 @@ class Workspaces(QObject):
             Qt.Orientation.Vertical,
         )
 
+    def _width_px(self, placement: PanelPlacement, workspace: Workspace) -> int:
+        """Return how wide a place is: as the panel in front of it needs, where there is room."""
+        room_px = self._window.width()
+        width_px = placement.width_px(room_px)
+        for each in workspace.placements:
+            dock = self._docks.get(each.title)
+            fits = each.tabbed == placement.title and room_px >= MOST_PART * each.least_px
+            if fits and dock is not None and is_in_front(self._window, dock):
+                width_px = max(width_px, each.least_px)
+        return width_px
+
     def fit(self) -> None:
-        """Give the columns beside the middle the width that they have in a window of this size."""
+        """Give the columns the width that they have in a window of this size."""
         workspace = self._known.get(self._current)
-        if workspace is not None and workspace.middle:
+        if workspace is not None:
             self._size(workspace)
 
     def _place_lost(self, dock: QDockWidget) -> None:
@@ -389,17 +406,10 @@ class Workspaces(QObject):
         placement = next((each for each in placements if each.title == title), None)
         if placement is None or dock.isFloating() or not dock.isVisible():
             return
-        least_px = placement.least_px
-        if not placement.tabbed:
-            before_px = self._narrow_px.pop(title, 0)
-            if before_px:
-                self._widen(dock, before_px)
-        elif dock.width() < least_px and self._window.width() >= MOST_PART * least_px:
-            self._narrow_px.setdefault(placement.tabbed, dock.width())
-            self._widen(dock, least_px)
-
-    def _widen(self, dock: QDockWidget, width_px: int) -> None:
-        self._window.resizeDocks([dock], [width_px], Qt.Orientation.Horizontal)
+        beside = [each.least_px for each in placements if each.tabbed == title and each.least_px]
+        too_wide = not placement.tabbed and beside and dock.width() >= min(beside)
+        if too_wide or dock.width() < placement.least_px:
+            self.fit()
 
     def _on_toggled(self, shown: bool) -> None:
         self._altered = True
@@ -407,6 +417,8 @@ class Workspaces(QObject):
         for dock in self._docks.values():
             if shown and dock.toggleViewAction() is action:
                 self._place_lost(dock)
+                dock.raise_()
+                QTimer.singleShot(0, self, self.fit)
 
 
 def _within(least: QSize, room: QSize) -> bool:
