@@ -271,6 +271,16 @@ def test_no_panel_that_comes_to_the_front_scrolls_sideways(
             assert settled(qtbot, partial(sideways, own)) == [], title
 
 
+def test_the_fields_of_a_file_fit_into_a_narrow_column(own: OperatorWindow, qtbot: QtBot) -> None:
+    own.resize(*SIZES["1024x600"])
+    choose(own, qtbot, LOOK)
+    recorder = tasks(own).central_view.camera.recorder
+    qtbot.mouseClick(recorder.more, LEFT)
+    qtbot.waitUntil(recorder.files.base.isVisible)
+    assert settled(qtbot, partial(sideways, own)) == []
+    assert recorder.files.directory.width() > 60
+
+
 def sideways(window: QWidget) -> list[str]:
     """Return the panels that are wider than their place."""
     areas = window.findChildren(QScrollArea)

@@ -28,6 +28,8 @@ SWAP_KEY: Final = "F6"
 LOOK_MS: Final = 250
 FOCUS_STEP: Final = 20
 BAR_PX: Final = 30
+FIELD_PX: Final = 9 * STEP_PX
+"""In so much room an exposure time is read."""
 
 
 class ImageBar(QWidget):
@@ -258,6 +260,8 @@ class ImageBar(QWidget):
 
 
 def _least_px(widget: QWidget) -> int:
+    if isinstance(widget, QStackedWidget):
+        return FIELD_PX
     return min(max(widget.minimumSizeHint().width(), widget.minimumWidth()), widget.maximumWidth())
 
 

@@ -53,7 +53,7 @@ class FileFields(QWidget):
         self.directory = tipped(QLineEdit(str(directory)), station or "Where files are stored")
         self.browse = push_button("Browse…", station or "Choose the directory")
         self.browse.setEnabled(not station)
-        grid = QGridLayout(self)
+        self._grid = grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(STEP_PX // 2)
         for row, (caption, field, beside) in enumerate(
@@ -68,6 +68,15 @@ class FileFields(QWidget):
         self.directory.textEdited.connect(self._on_edited)
         self.stamp.toggled.connect(self._on_edited)
         self.browse.clicked.connect(self._on_browse)
+
+    def stack(self) -> None:
+        """Put what stands beside the fields below them, for a narrow column."""
+        self.directory.setMinimumWidth(6 * STEP_PX)
+        for row, (field, beside) in enumerate(
+            ((self.base, self.stamp), (self.directory, self.browse))
+        ):
+            self._grid.addWidget(field, row, 1, 1, 2)
+            self._grid.addWidget(beside, 2 + row, 1, 1, 2)
 
     @property
     def folder(self) -> Path:

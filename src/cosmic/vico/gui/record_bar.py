@@ -166,6 +166,11 @@ class RecordBar(QWidget):
 
     def stack(self) -> None:
         """Put the buttons above each other, for a column too narrow for a row."""
+        self.files.stack()
+        self.format.setMinimumContentsLength(6)
+        self.format.setSizeAdjustPolicy(
+            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
         second = QHBoxLayout()
         second.setSpacing(STEP_PX // 2)
         for button in (self.lapse, self.more):
