@@ -455,11 +455,12 @@ class CosmicServerGui(QMainWindow):
     @override
     def focusNextPrevChild(self, next: bool) -> bool:
         """Go on to what is in sight: Qt takes panels behind others for visible."""
-        first = QApplication.focusWidget()
+        met = {QApplication.focusWidget()}
         while super().focusNextPrevChild(next):
             now = QApplication.focusWidget()
-            if now is None or now is first or not self._is_behind(now):
+            if now in met or now is None or not self._is_behind(now):
                 return True
+            met.add(now)
         return False
 
     def _is_behind(self, widget: QWidget) -> bool:
