@@ -18,6 +18,7 @@ from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import MoveCancelled
 from cosmic.twin.scene import Scene
 from cosmic.vico.api import find_fibres
+from cosmic.vico.api.camera_shown import Seen
 from cosmic.vico.core.camera_thread import CameraThread
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.recording.reading import open_image_recording
@@ -183,19 +184,24 @@ def test_at_a_zoom_without_calibration_no_position_is_given(lab: Lab) -> None:
         lab.rig.vico.snap()
 
 
-def test_the_tips_are_seen_where_stages_and_calibration_expect_them(lab: Lab) -> None:
-    lower(lab)
+def analysed_with(lab: Lab, link: str) -> Seen:
+    """Return what is found on an image that is taken once a link of the chain is on."""
     camera = lab.rig.vico.camera()
-    camera.switch("tips", on=True)
+    camera.switch(link, on=True)
     try:
         since = camera.next_image().frame.frame_id
         wait_until(
             lambda: camera.analysis is not None and camera.analysis.image.frame.frame_id > since
         )
         assert camera.analysis is not None
-        (tip,) = camera.analysis.tips
+        return camera.analysis
     finally:
-        camera.switch("tips", on=False)
+        camera.switch(link, on=False)
+
+
+def test_the_tips_are_seen_where_stages_and_calibration_expect_them(lab: Lab) -> None:
+    lower(lab)
+    (tip,) = analysed_with(lab, "tips").tips
     assert tip.name == "right"
     assert tip.certain
     assert tip.point_px == pytest.approx(lab.tip_px(), abs=1.5)
@@ -203,21 +209,11 @@ def test_the_tips_are_seen_where_stages_and_calibration_expect_them(lab: Lab) ->
 
 def test_jaws_are_no_fibres_where_the_calibration_has_them(lab: Lab) -> None:
     lower(lab)
-    camera = lab.rig.vico.camera()
-    image = camera.next_image()
+    image = lab.rig.vico.camera().next_image()
     assert sum(each.width_px > JAW_PX for each in find_fibres(image.data)) == 2
-    camera.switch("fibres", on=True)
-    try:
-        since = camera.next_image().frame.frame_id
-        wait_until(
-            lambda: camera.analysis is not None and camera.analysis.image.frame.frame_id > since
-        )
-        assert camera.analysis is not None
-        widths_px = [each.width_px for each in camera.analysis.fibres]
-    finally:
-        camera.switch("fibres", on=False)
-    assert widths_px
-    assert max(widths_px) < JAW_PX
+    for found in (analysed_with(lab, "fibres").fibres, lab.rig.vico.find_fibres()):
+        assert found
+        assert max(each.width_px for each in found) < JAW_PX
 
 
 # ------------------------------------------------------------------ calibrating

@@ -202,8 +202,9 @@ class PlatformTransform(CoordinateTransform):
         """Return where the tips should be on an image; those that cannot be told are missing."""
         return self._expected(image, any_map=False)
 
+    @override
     def expected_bodies(self, image: CameraImage) -> Mapping[str, ExpectedTool]:
-        """Return where tools should be to some pixels: by the map of another tool as well."""
+        # To some pixels the map of another tool at that height does as well.
         return self._expected(image, any_map=True)
 
     def _expected(self, image: CameraImage, *, any_map: bool) -> Mapping[str, ExpectedTool]:

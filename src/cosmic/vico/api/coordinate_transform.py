@@ -1,13 +1,14 @@
 """What joins pixels and platform; whoever hosts micromanipulation as well provides it."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Protocol
 
 from cosmic.frame.operation import Task
 from cosmic.vico.core.image import CameraImage
+from cosmic.vico.core.vision.tool_types import ExpectedTool
 
 Pixel = tuple[float, float]
 
@@ -77,6 +78,10 @@ class CoordinateTransform(Protocol):
         NotAvailable
             Not calibrated there; the text says what to do.
         """
+
+    def expected_bodies(self, image: CameraImage) -> Mapping[str, ExpectedTool]:  # noqa: ARG002
+        """Return where tools should be on an image, to some pixels; those not known are missing."""
+        return {}
 
     @property
     @abstractmethod

@@ -12,6 +12,7 @@ from cosmic.vico.core.vision.algorithms import grey
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.finding import find_fibres
 from cosmic.vico.core.vision.grey import Floats
+from cosmic.vico.core.vision.tool_bodies import without_tools
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,11 +61,16 @@ class PlacedFibre(Fibre):
 
 
 def locate_fibres(image: CameraImage, transform: CoordinateTransform | None) -> list[PlacedFibre]:
-    """Find the fibres on an image and say how long they are and where."""
+    """Find the fibres on an image and say how long they are and where.
+
+    What is in doubt and lies on a tool whose place is known is left out.
+    """
     reason = (
         "micromanipulation is not hosted here" if transform is None else transform.problem(image)
     )
-    return [_located(each, image, transform, reason) for each in find_fibres(grey(image.data))]
+    tools = {} if transform is None else transform.expected_bodies(image)
+    found = without_tools(find_fibres(grey(image.data)), tools.values())
+    return [_located(each, image, transform, reason) for each in found]
 
 
 def _located(
