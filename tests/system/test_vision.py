@@ -216,6 +216,30 @@ def test_jaws_are_no_fibres_where_the_calibration_has_them(lab: Lab) -> None:
         assert max(each.width_px for each in found) < JAW_PX
 
 
+def test_tools_are_expected_at_their_height_shut_or_by_the_map_of_another(lab: Lab) -> None:
+    lower(lab)
+    image = lab.rig.vico.camera().next_image()
+    transform = lab.rig.vico.application.transform
+    assert isinstance(transform, PlatformTransform)
+
+    def at(**moved: float) -> CameraImage:
+        axes = image.circumstances.positions | {
+            name.replace("_", "."): to for name, to in moved.items()
+        }
+        return replace(image, circumstances=replace(image.circumstances, positions=axes))
+
+    (wide,) = transform.expected_tools(image).values()
+    (shown,) = lab.rig.vico.calibrated
+    assert wide.scale_um_px == pytest.approx(shown.scale_um_px, rel=0.001)
+    assert not wide.shut
+    shut = transform.expected_tools(at(right_gripper=0.0))["right"]
+    assert shut.shut
+    assert shut.width_px == pytest.approx(2.0 * wide.width_px, rel=0.01)
+    beside = at(left_x=3000.0, left_y=300.0, left_z=HEIGHT_UM - 1500.0)
+    assert set(transform.expected_tools(beside)) == {"right"}
+    assert set(transform.expected_bodies(beside)) == {"left", "right"}
+
+
 # ------------------------------------------------------------------ calibrating
 
 

@@ -54,3 +54,16 @@ def test_a_cold_platform_says_what_is_missing_and_what_to_press(make: Make, qtbo
     assert rows["Scale and rotation"].button.text() == "Calibrate"
     assert rows["First click-to-move"].text.text() == "After scale and rotation"
     QApplication.processEvents()
+
+
+def test_the_axes_of_a_tool_with_a_tip_are_checked_whatever_is_chosen(
+    make: Make, qtbot: QtBot
+) -> None:
+    window = make(applications=("mico", "daqco", "vico"))
+    tasks = window.tasks
+    assert tasks is not None
+    words = tasks.first_day.rows["Know your stage"].text
+    for chosen, checked in (("right", "right"), ("table", "left")):
+        tasks.tool.choose(chosen)
+        window.raise_panel("First day")
+        qtbot.waitUntil(lambda checked=checked: f"Moves the {checked} " in words.text())

@@ -47,6 +47,17 @@ def test_the_coach_is_not_switched_off_by_pressing_its_button_twice(
     assert not coach.off.isChecked()
 
 
+def test_the_button_of_the_coach_says_what_a_click_does(
+    window: QWidget, qtbot: QtBot, stored: QSettings
+) -> None:
+    coach = Coach((), stored)
+    show(window, coach, qtbot)
+    for word in ("on", "off"):
+        qtbot.mouseClick(coach.off, Qt.MouseButton.LeftButton)
+        assert coach.off.text() == word
+        assert coach.off.toolTip().endswith(word)
+
+
 def test_a_button_of_the_card_that_goes_leaves_the_focus_in_the_card(
     window: QWidget, qtbot: QtBot
 ) -> None:

@@ -29,6 +29,7 @@ from cosmic.app.windows.central_view import CentralView
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.app.windows.tasks import HANDLE, LOOK, MEASURE, SET_UP, TaskLayout
 from cosmic.autonomy.coordinate_transform import PlatformTransform
+from cosmic.daqco.gui.channel_list import ChannelList
 from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.limit_indicator import LimitIndicator
 from cosmic.frame.gui.elided_label import ElidedLabel
@@ -337,6 +338,43 @@ def test_panels_that_share_a_place_have_tabs_in_every_workspace(
     assert settled(qtbot, partial(stale_tabs, own)) == []
 
 
+def test_tabs_go_with_the_workspace_that_they_belong_to(own: OperatorWindow, qtbot: QtBot) -> None:
+    own.resize(*SIZES["1366x768"])
+    for name, title in ((HANDLE, ""), (LOOK, "Camera"), (HANDLE, "Recorder"), (LOOK, "")):
+        choose(own, qtbot, name)
+        if title:
+            own.raise_panel(title)
+        qtbot.wait(100)
+    for name in (HANDLE, MEASURE):
+        choose(own, qtbot, name)
+        assert settled(qtbot, partial(stale_tabs, own)) == [], name
+
+
+def test_a_panel_from_the_view_menu_comes_in_front(own: OperatorWindow, qtbot: QtBot) -> None:
+    choose(own, qtbot, LOOK)
+    lens = own.dock("Lens and light")
+    lens.toggleViewAction().trigger()
+    qtbot.waitUntil(own.dock("Camera").isVisible)
+    lens.toggleViewAction().trigger()
+    qtbot.waitUntil(lambda: not lens.visibleRegion().isEmpty())
+
+
+def test_a_narrow_bar_on_the_image_leaves_out_before_it_cuts(
+    own: OperatorWindow, qtbot: QtBot
+) -> None:
+    own.resize(*SIZES["1024x600"])
+    choose(own, qtbot, HANDLE)
+    bar = own.findChild(QWidget, "imageBar")
+    assert bar is not None
+    light = next(each for each in bar.findChildren(QWidget) if each.accessibleName() == "Light")
+    qtbot.waitUntil(light.isVisible)
+    own.raise_panel("Recorder")
+    qtbot.waitUntil(lambda: not light.isVisible())
+    assert settled(qtbot, partial(clipped, bar)) == []
+    own.raise_panel("Tool")
+    qtbot.waitUntil(light.isVisible)
+
+
 def test_columns_keep_their_share_when_the_window_changes_its_size(
     own: OperatorWindow, qtbot: QtBot
 ) -> None:
@@ -358,14 +396,16 @@ def test_columns_keep_their_share_when_the_window_changes_its_size(
     qtbot.waitUntil(lambda: wide.width() > 350)
 
 
+@pytest.mark.parametrize("named", [True, False])
 def test_a_reset_lasts_and_a_layout_as_at_the_start_can_be_kept(
-    make: Make, qtbot: QtBot, stored: QSettings
+    make: Make, qtbot: QtBot, stored: QSettings, named: bool
 ) -> None:
     window = make(applications=("mico", "daqco", "vico"), hardware=False)
     spaces = window.workspaces
     assert spaces is not None
-    spaces.save_as("mine")
-    assert spaces.layouts == ("usual", "mine")
+    if named:
+        spaces.save_as("mine")
+    assert spaces.layouts == (("usual", "mine") if named else ("usual",))
     choose(window, qtbot, HANDLE)
     usual = shown(window)
     window.dock("Next step").hide()
@@ -391,6 +431,14 @@ def test_the_tab_key_goes_to_what_is_in_sight(own: OperatorWindow, qtbot: QtBot)
         assert dock is None or not dock.visibleRegion().isEmpty(), now.objectName()
         met.add(now)
     assert len(met) > 30, "it goes round among a few"
+    own.raise_panel("Force channels")
+    dock = own.dock("Force channels")
+    qtbot.waitUntil(lambda: not dock.visibleRegion().isEmpty())
+    channels = dock.findChild(ChannelList)
+    assert channels is not None
+    channels.setFocus()
+    qtbot.keyClick(channels, Qt.Key.Key_Tab)
+    assert not channels.hasFocus()
 
 
 def holder_of(widget: QWidget | None) -> QDockWidget | None:

@@ -25,7 +25,7 @@ from cosmic.frame.gui.keys_dialog import KeyList, KeysDialog
 from cosmic.frame.gui.layout_store import LayoutStore
 from cosmic.frame.gui.palette import ThemeName
 from cosmic.frame.gui.screen_fit import DialogFitter, fit_to_screen
-from cosmic.frame.gui.tab_bars import tidy_tab_bars
+from cosmic.frame.gui.tab_bars import hide_stale_tab_bars
 from cosmic.frame.gui.theme import STEP_PX, apply_theme, current_palette
 from cosmic.frame.gui.top_bar import TopBar
 from cosmic.frame.gui.wheel_guard import WheelGuard
@@ -397,7 +397,7 @@ class CosmicServerGui(QMainWindow):
             self._workspaces.reset()
             return
         self._store.reset(self)
-        tidy_tab_bars(self)
+        hide_stale_tab_bars(self)
 
     def _on_message_clicked(self) -> None:
         in_drawer = self._drawer is not None and LOG_TITLE in self._drawer.titles
@@ -442,7 +442,7 @@ class CosmicServerGui(QMainWindow):
         super().showEvent(event)
 
     def _after_first_show(self) -> None:
-        tidy_tab_bars(self)
+        hide_stale_tab_bars(self)
         self._fit()  # now that the desktop has put its frame round it
         self.windowHandle().screenChanged.connect(self._on_screen_changed)
 

@@ -4,8 +4,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QTabBar
 
 
-def tidy_tab_bars(window: QMainWindow) -> None:
-    """Show the tab bars of groups of docks as they are now, and hide all others.
+def hide_stale_tab_bars(window: QMainWindow) -> None:
+    """Hide the tab bars that belong to no group of docks as it is now.
 
     Qt 6 keeps the bar of an earlier arrangement visible, over or below the one in use. Of several
     for one group the one made last is in use.
@@ -24,7 +24,6 @@ def tidy_tab_bars(window: QMainWindow) -> None:
         group = frozenset(_titles(bar))
         if group in wanted:
             wanted.remove(group)
-            bar.show()
         else:
             bar.hide()
 
