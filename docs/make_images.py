@@ -15,7 +15,7 @@ from typing import Final
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
-from PySide6.QtCore import QPointF, QSettings, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, QPointF, QSettings, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QPushButton, QWidget
 
@@ -95,6 +95,8 @@ class Scene:
         ends = time.monotonic() + seconds
         while time.monotonic() < ends:
             self._app.processEvents()
+            # Left to a loop that runs: what is deleted later, such as tabs of another workspace.
+            QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
             threading.Event().wait(0.005)
 
     def until(self, condition: Callable[[], bool]) -> None:

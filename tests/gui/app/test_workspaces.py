@@ -20,7 +20,6 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QPushButton,
     QScrollArea,
-    QTabBar,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
@@ -308,46 +307,6 @@ def test_a_layout_kept_in_a_larger_window_comes_back_in_a_smaller_one(
         choose(own, qtbot, name)
         qtbot.wait(100)
         assert (own.width(), own.height()) == small, name
-        assert settled(qtbot, partial(stale_tabs, own)) == [], name
-
-
-def stale_tabs(window: OperatorWindow) -> list[str]:
-    """Return the tabs in sight of panels that are not there, and panels behind others without."""
-    bars = window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
-    docks = [each for each in window.findChildren(QDockWidget) if each.isVisible()]
-    titles = {each.windowTitle() for each in docks}
-    in_sight = [bar for bar in bars if bar.isVisible() and window.rect().contains(bar.geometry())]
-    named = [[bar.tabText(row) for row in range(bar.count())] for bar in in_sight]
-    offered = {name for names in named for name in names}
-    grouped = {each.windowTitle() for each in docks if window.tabifiedDockWidgets(each)}
-    return [
-        *(f"tabs of nothing: {names}" for names in named if names and not titles & set(names)),
-        *(f"{title} has no tab" for title in sorted(grouped - offered)),
-    ]
-
-
-def test_panels_that_share_a_place_have_tabs_in_every_workspace(
-    own: OperatorWindow, qtbot: QtBot
-) -> None:
-    assert own.workspaces is not None
-    names = [each.name for each in own.workspaces.all]
-    for name in (HANDLE, SET_UP, *names, *reversed(names)):
-        choose(own, qtbot, name)
-        assert settled(qtbot, partial(stale_tabs, own)) == [], name
-    own.reset_layout()
-    assert settled(qtbot, partial(stale_tabs, own)) == []
-
-
-def test_tabs_go_with_the_workspace_that_they_belong_to(own: OperatorWindow, qtbot: QtBot) -> None:
-    own.resize(*SIZES["1366x768"])
-    for name, title in ((HANDLE, ""), (LOOK, "Camera"), (HANDLE, "Recorder"), (LOOK, "")):
-        choose(own, qtbot, name)
-        if title:
-            own.raise_panel(title)
-        qtbot.wait(100)
-    for name in (HANDLE, MEASURE):
-        choose(own, qtbot, name)
-        assert settled(qtbot, partial(stale_tabs, own)) == [], name
 
 
 def test_a_panel_from_the_view_menu_comes_in_front(own: OperatorWindow, qtbot: QtBot) -> None:
@@ -355,8 +314,10 @@ def test_a_panel_from_the_view_menu_comes_in_front(own: OperatorWindow, qtbot: Q
     lens = own.dock("Lens and light")
     lens.toggleViewAction().trigger()
     qtbot.waitUntil(own.dock("Camera").isVisible)
+    qtbot.wait(300)
     lens.toggleViewAction().trigger()
-    qtbot.waitUntil(lambda: not lens.visibleRegion().isEmpty())
+    qtbot.wait(300)  # in the first moment it is where it was, whoever is in front
+    assert not lens.visibleRegion().isEmpty()
 
 
 def test_a_narrow_bar_on_the_image_leaves_out_before_it_cuts(

@@ -10,7 +10,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QDockWidget, QMainWindow
 
 from cosmic.frame.gui.application_events import at_one_go
-from cosmic.frame.gui.tab_bars import hide_stale_tab_bars, is_in_front
+from cosmic.frame.gui.tab_bars import is_in_front
 
 Area = Qt.DockWidgetArea
 _GROUP: Final = "workspaces"
@@ -315,7 +315,6 @@ class Workspaces(QObject):
         self._laying = False
         self._lay_out()  # else the least size is still that of the layout kept
         window.resize(size)
-        hide_stale_tab_bars(window)
         window.setUpdatesEnabled(True)
         QTimer.singleShot(0, self, self.fit)
 
