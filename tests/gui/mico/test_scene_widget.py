@@ -1,6 +1,7 @@
 """The scene where there is no OpenGL: projections with the same content."""
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QLabel, QToolButton, QWidget
 
+from cosmic.frame.gui.palette import contrast_ratio
 from cosmic.frame.gui.theme import apply_theme
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.poses import Pose
@@ -289,6 +291,24 @@ def test_the_theme_can_change_while_it_is_shown(qapp, scene):
     dark = picture(scene).mean()
     apply_theme(qapp, "light")
     assert picture(scene).mean() > dark + 40.0
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_a_jaw_is_seen_over_a_bright_plate(qapp, qtbot, theme):
+    apply_theme(qapp, theme)
+    model = two_arms()
+    bright = [replace(each, colour=(0.86, 0.9, 0.94, 0.9)) for each in model.views]
+    widget = SceneWidget()
+    qtbot.addWidget(widget)
+    widget.set_model(replace(model, views=tuple(bright)))
+    widget.resize(700, 500)
+    widget.show()
+    qtbot.waitExposed(widget)
+    top = widget.view.panels()[0]
+    x, y = top.project(np.array([[-8.0, 0.0, 2.0]]))[0]
+    across = picture(widget)[int(y) - 12 : int(y) + 13, int(x)]
+    plate, *others = [QColor(*(int(part) for part in each)).name() for each in across]
+    assert max(contrast_ratio(plate, each) for each in others) >= 2.0
 
 
 def test_another_model_replaces_the_first(scene):

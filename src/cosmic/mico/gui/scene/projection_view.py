@@ -38,6 +38,7 @@ from cosmic.mico.gui.scene.view import SceneView
 _TITLES: Final = {TOP: "Top", FRONT: "Front", SIDE: "Side"}
 _AXIS_PX: Final = 28
 _INSET_PX: Final = 40 * STEP_PX
+_RIM_PX: Final = 3.0
 """In less width there is one picture, from above, without rulers: two are too small to read."""
 
 
@@ -233,6 +234,9 @@ class ProjectionView(SceneView):
             return
         fill = QColor.fromRgbF(red, green, blue, 0.8 * opacity)
         edge = blend(QColor.fromRgbF(red, green, blue).name(), palette.text, 0.6)
+        painter.setPen(_pen(palette.window, _RIM_PX))  # else jaws are lost over a bright plate
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawPolygon(outline.shape_mm)
         painter.setPen(_pen(edge, 1.0))
         painter.setBrush(fill)
         painter.drawPolygon(outline.shape_mm)
