@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.grey import Floats
+from cosmic.vico.core.vision.profiles import Scene, sample
 from cosmic.vico.core.vision.refine import STEP_PX, Course
 
 OUT_OF_FOCUS = "out of focus: its edges are blurred over a large part of its width"
@@ -25,6 +26,7 @@ PARTED = "it may be two fibres side by side: the ground shows between its edges"
 RUNS_ON = (EndKind.BODY, EndKind.LOST)
 EDGING = "it lies along the edge of something wider"
 DIRTY_END = "at an end its edges are not seen: dirt may lie there"
+DRAWN = "it is as straight and as even as a line drawn into the picture: a scale bar, or a frame"
 SHARP = "it bends more sharply than its own width"
 # Of stretches along a fibre, what so many per cent differ by is its own unevenness.
 OWN_UNEVENNESS = 90.0
@@ -47,6 +49,8 @@ class Limits:
     width_spread: float = 0.3
     seen: float = 0.6
     gap_widths: float = 14.0
+    aslant_px: float = 0.3
+    even_of_noise: float = 0.8
 
 
 LIMITS = Limits()
@@ -194,3 +198,14 @@ def outward(line: Floats, at: int) -> Floats:
     inner = min(8, len(line) - 1)
     step = line[0] - line[inner] if at == 0 else line[-1] - line[-1 - inner]
     return np.asarray(step / max(float(np.linalg.norm(step)), 1e-9))
+
+
+def is_drawn(scene: Scene, course: Course) -> bool:
+    """Return whether it lies along rows or columns, and has less noise than the ground."""
+    if float(np.ptp(course.line, axis=0).min()) > LIMITS.aslant_px:
+        return False
+    x, y = (course.line[:, axis].astype(np.float32)[None] for axis in (0, 1))
+    levels = sample(scene.image, x, y)[0].astype(np.float64)
+    inner = levels[len(levels) // 8 : len(levels) - len(levels) // 8]
+    spread = 1.4826 * float(np.median(np.abs(inner - np.median(inner))))
+    return spread < LIMITS.even_of_noise * course.noise

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.frame.errors import NotAvailable
-from cosmic.vico.core.vision import axial, certainty, checks
+from cosmic.vico.core.vision import axial, certainty, checks, picture_edge
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
@@ -279,6 +279,12 @@ def checked_fibres(
             doubts.append(checks.PARTED)
         if touches_border(scene, course):
             doubts.append(EndKind.BORDER.value)
+        if picture_edge.is_cut(
+            scene, course, explained, compressed=signs.compressed > certainty.NOISE
+        ):
+            doubts.append(picture_edge.CUT)
+        if checks.is_drawn(scene, course):
+            doubts.append(checks.DRAWN)
         if crowd:
             doubts.append(checks.CROWDED)
         if index in apart:

@@ -25,7 +25,8 @@ def grey_image(image: npt.NDArray[np.generic]) -> Pixels:
 
     uint8 and uint16 stay as they are. bool becomes 0 and 255. Other whole numbers and floats are
     stretched, evenly, from their smallest finite value (0) to their largest (65535); NaN and
-    infinite pixels become the median of the rest. Three layers are weighed as blue, green and red,
+    infinite pixels, and those that a masked array masks, become the median of the rest: a fibre
+    that they cut off is doubted. Three layers are weighed as blue, green and red,
     a fourth is left out as opacity. A raw Bayer mosaic cannot be told from a grey image: it is to
     be converted before.
 
@@ -55,13 +56,22 @@ def grey_image(image: npt.NDArray[np.generic]) -> Pixels:
             f"the image is too large; fibres are looked for up to {MOST_SIDE_PX} pixels a side, "
             f"not {said}"
         )
-    pixels = _levels(image, said)
+    pixels = _levels(_unmasked(image, said), said)
     if pixels.ndim == LAYERS and pixels.shape[2] == 1:
         pixels = cast("Pixels", np.ascontiguousarray(pixels[:, :, 0]))
     elif pixels.ndim == LAYERS:
         colour = cast("Pixels", np.ascontiguousarray(pixels[:, :, :LAYERS]))
         pixels = cast("Pixels", cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY))
     return pixels
+
+
+def _unmasked(image: npt.NDArray[np.generic], said: str) -> npt.NDArray[np.generic]:
+    if not (isinstance(image, np.ma.MaskedArray) and np.ma.is_masked(image)):
+        return image
+    seen = image.compressed()
+    if not seen.size:
+        raise ConfigError(f"the image is masked everywhere: {said}")
+    return np.asarray(image.filled(np.median(seen).astype(image.dtype)))
 
 
 def _levels(image: npt.NDArray[np.generic], said: str) -> Pixels:
