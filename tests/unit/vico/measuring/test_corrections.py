@@ -5,10 +5,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from cosmic.app.cli import main
-from cosmic.frame.errors import ConfigError, RecordingError
+from cosmic.frame.errors import ConfigError, RecordingError, RecordingExistsError
 from cosmic.vico.api import find_fibres
 from cosmic.vico.core.measuring.corrections import Corrections
 from unit.vico.vision.drawn_fibres import arc, drawn_image
@@ -110,3 +111,57 @@ def test_training_data_of_what_was_saved_are_exported_by_a_command(tmp_path: Pat
     edits.save(file)
     assert main(["correct", str(file), "--export", str(tmp_path / "out")]) == 0
     assert json.loads((tmp_path / "out" / "a.json").read_text())["fibres"] == []
+
+
+def image_file(folder: Path, name: str, pixels: npt.NDArray[np.uint8] = IMAGE) -> Path:
+    file = folder / name
+    assert cv2.imwrite(str(file), pixels)
+    return file
+
+
+def test_an_export_beside_the_image_leaves_the_image_as_it_was(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = image_file(tmp_path, "a.png", np.dstack([IMAGE] * 3))
+    before = file.read_bytes()
+    assert main(["correct", str(file), "--export", str(tmp_path)]) == 1
+    said = capsys.readouterr().err
+    assert f"{file}: there is such a file" in said
+    assert "another folder" in said
+    assert file.read_bytes() == before
+    assert [each.name for each in tmp_path.iterdir()] == ["a.png"]
+
+
+@pytest.mark.parametrize("there", ["a.png", "a-labels.png", "a.json"])
+def test_an_export_replaces_no_file_and_leaves_no_half(tmp_path: Path, there: str) -> None:
+    (tmp_path / there).write_text("mine")
+    with pytest.raises(RecordingExistsError, match=there):
+        corrected().export(tmp_path, "a")
+    assert [each.name for each in tmp_path.iterdir()] == [there]
+    assert (tmp_path / there).read_text() == "mine"
+
+
+def test_two_images_of_one_name_are_not_exported_over_each_other(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    first, second = image_file(tmp_path, "s.png"), image_file(tmp_path, "s.tif", IMAGE[::-1].copy())
+    assert main(["correct", str(first), "--export", str(out)]) == 0
+    before = {each: each.read_bytes() for each in out.iterdir()}
+    assert main(["correct", str(second), "--export", str(out)]) == 1
+    assert {each: each.read_bytes() for each in out.iterdir()} == before
+
+
+def test_a_screenshot_does_not_replace_the_image(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = image_file(tmp_path, "a.png")
+    before = file.read_bytes()
+    command = ["correct", str(file), "--offscreen", "0", "--screenshot", str(file)]
+    assert main(command) == 1
+    assert "another file" in capsys.readouterr().err
+    assert file.read_bytes() == before
+
+
+def test_an_export_into_a_file_says_that_it_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("")
+    with pytest.raises(RecordingError, match="cannot be written"):
+        corrected().export(tmp_path / "out", "a")

@@ -7,7 +7,9 @@ belongs to one image, known by a digest of its pixels.
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,7 +19,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.frame.errors import ConfigError, RecordingError
+from cosmic.frame.errors import ConfigError, RecordingError, RecordingExistsError
 from cosmic.frame.kept_file import write_whole
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.grey import Floats, grey_image
@@ -229,24 +231,35 @@ class Corrections:
     def export(self, folder: Path, stem: str) -> None:
         """Write the image and its fibres as training data: pixels, labels, lines.
 
-        ``STEM.png`` is the image, ``STEM-labels.png`` has 0 for ground and the fibre's number, 16
-        bit, elsewhere (the later one where two cross), and ``STEM.json`` the lines. Raises
-        `RecordingError`.
+        ``STEM.png`` is the image in grey, ``STEM-labels.png`` has 0 for ground and the fibre's
+        number, 16 bit, where one is (the later one where two cross), and ``STEM.json`` the lines.
+
+        Raises
+        ------
+        RecordingError
+            They cannot be written; `RecordingExistsError` where one of them is there already:
+            nothing is replaced, the image that was corrected least of all.
         """
         labels = np.zeros(self._pixels.shape, np.uint16)
         for each in self.lines:
+            if not each.number <= MOST_LABELS:
+                raise RecordingError(
+                    f"{folder}: labels go to {MOST_LABELS}, and a fibre has the number "
+                    f"{each.number}; delete it before the export"
+                )
             mask = np.zeros(self._pixels.shape, np.uint8)
             line = resampled(each.line_px, 2.0)
             paint(mask, line, np.full(len(line), each.width_px))
-            labels[mask > 0] = min(each.number, MOST_LABELS)
-        lines = json.dumps({"fibres": [_plain(each) for each in self.lines]}, indent=1)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            for name, pixels in ((f"{stem}.png", self._pixels), (f"{stem}-labels.png", labels)):
-                (folder / name).write_bytes(cv2.imencode(".png", pixels)[1].tobytes())
-            (folder / f"{stem}.json").write_text(lines, encoding="utf-8")
-        except OSError as exc:
-            raise RecordingError(f"{folder}: cannot be written ({exc.strerror or exc})") from exc
+            labels[mask > 0] = each.number
+        lines = {"fibres": [_plain(each) for each in self.lines]}
+        _write_new(
+            folder,
+            {
+                f"{stem}.png": cv2.imencode(".png", self._pixels)[1].tobytes(),
+                f"{stem}-labels.png": cv2.imencode(".png", labels)[1].tobytes(),
+                f"{stem}.json": json.dumps(lines, indent=1).encode(),
+            },
+        )
 
 
 def side_file(image_file: Path) -> Path:
@@ -319,6 +332,34 @@ def _points(points: Sequence[Point]) -> tuple[Point, ...]:
     if not np.isfinite(np.array(plain)).all():
         raise ConfigError("corrections: a point is no number")
     return plain
+
+
+def _write_new(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write files, all of them or none; none of them may be there."""
+    made: list[Path] = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in contents.items():
+            path = folder / name
+            if os.path.lexists(path):
+                raise _exists(path)
+            with path.open("xb") as file:
+                made.append(path)
+                file.write(content)
+    except OSError as exc:
+        for path in made:
+            with suppress(OSError):
+                path.unlink()
+        if isinstance(exc, RecordingError):
+            raise
+        raise RecordingError(f"{folder}: cannot be written ({exc.strerror or exc})") from exc
+
+
+def _exists(path: Path) -> RecordingExistsError:
+    return RecordingExistsError(
+        f"{path}: there is such a file, and it is not replaced. Export to another folder, or move "
+        "the file away if it is an old export."
+    )
 
 
 def _plain(line: Line) -> dict[str, object]:
