@@ -92,3 +92,20 @@ def test_what_is_refused_or_cannot_be_saved_is_said(qtbot: QtBot) -> None:
     assert "No fibre" in editor.note.text()
     qtbot.mouseClick(editor.save, LEFT)
     assert "disk is full" in editor.note.text()
+
+
+def test_what_lies_outside_the_image_is_refused_and_costs_no_click(qtbot: QtBot) -> None:
+    editor = make(qtbot)
+    choose(qtbot, editor, "add")
+    click(qtbot, editor, 100.0, 220.0)
+    click(qtbot, editor, 100.0, -3.0)
+    assert "outside the image" in editor.note.text()
+    click(qtbot, editor, 300.0, 220.0)
+    click(qtbot, editor, 300.0, 220.0)
+    assert lengths(editor) == pytest.approx([200, 300], abs=4)
+    choose(qtbot, editor, "move end")
+    pane = editor.view.viewport()
+    qtbot.mousePress(pane, LEFT, pos=at(editor, 300.0, 220.0))
+    qtbot.mouseRelease(pane, LEFT, pos=at(editor, 300.0, -3.0))
+    assert "outside the image" in editor.note.text()
+    assert lengths(editor) == pytest.approx([200, 300], abs=4)

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cosmic.frame.errors import NotAvailable, RecordingError
+from cosmic.frame.errors import NotAvailable, RecordingError, RecordingExistsError
 from cosmic.vico.api.measure import Corrections, measure_page, read_images, side_file
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 def run(chosen: argparse.Namespace) -> int:
     """Open the editor, or export what was corrected; raises `CosmicError`."""
     file: Path = chosen.image
+    _check_screenshot(chosen.screenshot, file)
     pages = list(read_images(file))
     if len(pages) != 1:
         raise RecordingError(f"{file}: has {len(pages)} images; correct them one by one")
@@ -41,6 +42,17 @@ def run(chosen: argparse.Namespace) -> int:
     editor.setWindowTitle(f"{file.name}: fibres")
     editor.resize(1100, 850)
     return _shown(app, editor, chosen)
+
+
+def _check_screenshot(screenshot: Path | None, file: Path) -> None:
+    """Refuse a screenshot in place of what the command is about."""
+    if screenshot is not None and screenshot.resolve() in (
+        file.resolve(),
+        side_file(file).resolve(),
+    ):
+        raise RecordingExistsError(
+            f"{screenshot}: is the image or its corrections; save the screenshot as another file"
+        )
 
 
 def _application() -> "QApplication":

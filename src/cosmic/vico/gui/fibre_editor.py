@@ -111,6 +111,10 @@ class EditTool(Tool):
             self.cancel()
             self._do(lambda: self._corrections.add(points))
             return
+        if not self._corrections.contains(point_px):
+            # Here: at the end it would cost all points clicked.
+            self._report("That point is outside the image; click on it.")
+            return
         self._layer.open_line = [*points, point_px]
 
     def _join(self, line: Line) -> None:
