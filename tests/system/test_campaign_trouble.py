@@ -376,3 +376,27 @@ def test_an_instrument_that_is_dead_from_the_start_is_found_before_a_fibre_is_to
     assert bench.truth.of("grasped") == ()
     assert bench.fibres == ()
     bench.check_stands()
+
+
+# ---------------------------------------------------------------------- the force limit
+
+
+def test_a_limit_that_is_disarmed_in_a_push_ends_the_push(make: Make) -> None:
+    bench = make()
+    daqco = bench.rig.daqco
+    campaign = bench.rig.campaign("quick", bench.home / "out")
+
+    def watched() -> bool:
+        (limit,) = [each.settings for each in daqco.limits if each.settings.channel == "force"]
+        return campaign.operation == "push the spans" and limit.armed and limit.high == 140.0
+
+    campaign.start()
+    wait_for(watched, "a push")
+    daqco.disarm_limit("force")
+    wait_for(lambda: any(each.cause for each in bench.fibres), "a fibre that failed")
+    campaign.abort()
+    campaign.join()
+    assert bench.fibres[0].outcome is Outcome.FAILED
+    assert bench.fibres[0].cause == "no force limit"
+    assert daqco.limits[0].settings.armed
+    bench.check_nothing_ran_into_anything()

@@ -13,6 +13,7 @@ import cosmic
 from cosmic.daqco.core.recording_file import RecordingFile
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.config import shipped_config_dir
+from cosmic.vico.hw.peripherals import LensAxis
 from unit.mico.rigs import wait_until
 
 
@@ -273,3 +274,33 @@ def test_a_recording_is_active_until_its_file_is_closed(
         assert not rig.daqco.recording.active
     with cosmic.open_recording(tmp_path / "push.h5") as found:
         assert found.complete
+
+
+def test_a_side_of_a_limit_that_is_not_given_stays_watched() -> None:
+    with cosmic.connect(applications=("daqco",)) as rig:
+        (before,) = [each.settings for each in rig.daqco.limits if each.settings.channel == "force"]
+        rig.daqco.arm_limit("force", high=120.0)
+        (limit,) = [each.settings for each in rig.daqco.limits if each.settings.channel == "force"]
+        assert (limit.low, limit.high) == (before.low, 120.0)
+        assert limit.hysteresis == before.hysteresis
+        assert limit.armed
+        with pytest.raises(cosmic.ConfigError, match="low must lie below high") as refused:
+            rig.daqco.arm_limit("force", high=-1000.0)
+        assert "http" not in str(refused.value)
+        rig.daqco.set_limit(limit.model_copy(update={"low": None}))
+        assert rig.daqco.limits[0].settings.low is None
+        for forget in (rig.daqco.reset_limit, rig.daqco.remove_limit):
+            with pytest.raises(cosmic.ConfigError, match="no active channel 'forse'"):
+                forget("forse")
+
+
+def test_the_lens_has_two_motors_and_no_other() -> None:
+    with cosmic.connect(rate=50.0) as rig:
+        lens = rig.vico.lens
+        assert lens is not None
+        lens.zoom_to(6.0).wait(30.0)
+        by_name, by_axis = lens.state("zoom"), lens.state(LensAxis.ZOOM)  # type: ignore[arg-type]
+        assert by_name == by_axis
+        assert lens.state("focus") != by_name  # type: ignore[arg-type]
+        with pytest.raises(cosmic.ConfigError, match="no motor 'foo'"):
+            lens.state("foo")  # type: ignore[arg-type]

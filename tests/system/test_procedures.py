@@ -22,6 +22,7 @@ from cosmic.autonomy.procedures.parts import (
 )
 from cosmic.autonomy.procedures.procedure import Part
 from cosmic.autonomy.procedures.run import ProcedureRun
+from cosmic.autonomy.recorded.steps import PauseStep, RecordedProcedure, RecordStep
 from cosmic.mico.api.axis import Axis
 
 LIMIT_S = 20.0
@@ -199,3 +200,44 @@ def test_an_abort_ends_a_trajectory_on_its_way(rig: cosmic.Rig, tmp_path: Path) 
         run.wait(LIMIT_S)
     assert standing(rig)
     assert 5.0 < (axis.position_um or 0.0) < 200.0
+
+
+def test_nothing_that_moves_axes_begins_beside_a_campaign_or_a_calibration(
+    tmp_path: Path,
+) -> None:
+    with cosmic.connect(sample="three-dry", rate=20.0) as rig:
+        campaign = rig.campaign("quick", tmp_path / "one")
+        early, made = rig.calibrate(), rig.procedure(Procedure("wait", Wait()), rig)
+        campaign.start()
+        try:
+            for begin in (rig.calibrate, early.run_here, made.run_here):
+                with pytest.raises(cosmic.NotAvailable, match="a campaign is running"):
+                    begin()
+        finally:
+            campaign.abort()
+            campaign.join()
+        other = rig.campaign("quick", tmp_path / "two")
+        second = rig.calibrate()
+        early.start()
+        try:
+            with pytest.raises(cosmic.NotAvailable, match="calibrate is running"):
+                rig.campaign("quick", tmp_path / "three")
+            for begin in (other.start, second.start):
+                with pytest.raises(cosmic.NotAvailable, match="calibrate is running"):
+                    begin()
+        finally:
+            early.abort()
+            early.join()
+        other.abort()
+        assert not (tmp_path / "three").exists()
+
+
+def test_a_recording_that_a_replay_began_ends_with_it(tmp_path: Path) -> None:
+    replayed = RecordedProcedure(name="left open", step=[RecordStep(name="left open")])
+    with cosmic.connect(rate=20.0) as rig:
+        rig.replay(replayed, folder=tmp_path).run_here()
+        assert not rig.daqco.recording.active
+        assert rig.daqco.recording.path == tmp_path / "left-open_1.h5"
+        with rig.daqco.record(tmp_path / "own.h5"):
+            rig.replay(RecordedProcedure(name="pause", step=[PauseStep(seconds=0.1)])).run_here()
+            assert rig.daqco.recording.active, "it was not the replay's own"

@@ -1,7 +1,7 @@
 """Campaigns and calibrations on a platform, as a rig offers them; loads all procedures."""
 
 import platform as computer
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from cosmic.app.platform import Platform, stopped_since
@@ -30,7 +30,8 @@ def campaign_on(
     platform: Platform,
     recipe: Recipe | str | Path,
     folder: str | Path,
-    plates: PlateHandler | None = None,
+    plates: PlateHandler | None,
+    busy: Callable[[], str],
 ) -> Campaign:
     """Return a campaign that is ready to start; see `Rig.campaign`."""
     for name, value in (("recipe", recipe), ("folder", folder)):
@@ -55,6 +56,7 @@ def campaign_on(
         },
         provenance=provenance_of(platform, read),
         plates=plates,
+        busy=busy,
     )
     return open_campaign(read, Path(folder), host)
 

@@ -1,7 +1,7 @@
 """`Rig`: the whole platform, as scripts and the console see it."""
 
 import atexit
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -177,16 +177,16 @@ class Rig:
         CampaignError
             The folder holds another campaign, is in use, or cannot be written.
         NotAvailable
-            An application is not hosted here.
+            An application is not hosted here, or something runs.
         """
         from cosmic.app.procedures import campaign_on  # loads statistics, which takes a second
 
         handling = self._shared.handling
         if handling is not None and handling.running:
             raise NotAvailable("an operation on a fibre is running; wait until it has ended")
-        if self.running == A_CAMPAIGN:
-            raise NotAvailable("a campaign is running; end it first")
-        campaign = campaign_on(self, self._platform, recipe, folder, plates)
+        if other := self.running:
+            raise NotAvailable(f"{other} is running; end it first")
+        campaign = campaign_on(self, self._platform, recipe, folder, plates, lambda: self.running)
         self._shared.runs.add(campaign)
         return campaign
 
@@ -224,14 +224,16 @@ class Rig:
         Raises
         ------
         NotAvailable
-            An application is not hosted here.
+            An application is not hosted here, or something runs.
         ConfigError
             The platform has not what `settings` names, or there is no such calibration.
         """
         from cosmic.app.procedures import calibration_on
 
+        if other := self.running:
+            raise NotAvailable(f"{other} is running; end it first")
         procedure, work = calibration_on(self, settings, anew, zooms=zooms)
-        run = self.procedure(procedure, work)
+        run = self._made(procedure, work, lambda: self.running)
 
         def close() -> None:
             if run.over:
@@ -319,7 +321,8 @@ class Rig:
     def procedure(self, procedure: Procedure[W], work: W) -> ProcedureRun[W]:
         """Return a run of `procedure` that is ready to begin, in the platform's time.
 
-        It ends when motion is stopped or the platform closed, even where it only waits.
+        It ends when motion is stopped or the platform closed, even where it only waits. It does
+        not begin while a campaign runs.
 
         Parameters
         ----------
@@ -328,12 +331,16 @@ class Rig:
         work : object
             What its operations share, such as this rig and what they find.
         """
+        return self._made(procedure, work, lambda: A_CAMPAIGN if self.running == A_CAMPAIGN else "")
+
+    def _made(self, procedure: Procedure[W], work: W, busy: Callable[[], str]) -> ProcedureRun[W]:
         run = ProcedureRun(
             procedure,
             work,
             self._platform.clock,
             self._platform.policy,
             stopped=stopped_since(self._mico),
+            busy=busy,
         )
         self._shared.runs.add(cast("ProcedureRun[object]", run))
         return run

@@ -9,6 +9,7 @@ import json
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from threading import Lock
 from typing import Any, Final, Protocol, TextIO
@@ -54,18 +55,19 @@ class TruthFile(Truth):
     Parameters
     ----------
     path : Path
-        A new file; one that is there is replaced.
+        A new file. One of an earlier run is kept beside it, with a number in its name.
 
     Raises
     ------
     ConfigError
-        It cannot be written.
+        It cannot be written, or something else is there.
     """
 
     def __init__(self, path: Path) -> None:
         self._lock = Lock()
         try:
-            self._file: TextIO | None = path.open("w", encoding="utf-8")
+            _make_room(path)
+            self._file: TextIO | None = path.open("x", encoding="utf-8")
         except OSError as exc:
             raise ConfigError(f"{path}: cannot be written: {exc.strerror or exc}") from exc
 
@@ -83,6 +85,23 @@ class TruthFile(Truth):
             if self._file is not None:
                 self._file.close()
                 self._file = None
+
+
+def _make_room(path: Path) -> None:
+    """Rename the truth of an earlier run; raises `ConfigError` where there is anything else."""
+    if not path.exists():
+        return
+    if not path.is_file():
+        raise ConfigError(f"{path}: is no file; give the name of a new one")
+    with path.open("rb") as file:
+        begin = file.read(1000)
+    if begin.strip() and not begin.startswith(b'{"time_s":'):
+        raise ConfigError(f"{path}: exists and is no file of the twin's truth; give another name")
+    if not begin.strip():
+        path.unlink()
+        return
+    taken = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in count(1))
+    path.rename(next(each for each in taken if not each.exists()))
 
 
 def _rounded(value: object) -> object:

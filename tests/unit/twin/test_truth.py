@@ -105,3 +105,21 @@ def test_the_probe_in_a_jaw_is_a_contact_and_beside_it_is_none() -> None:
     bench.go(probe_y=-4700.0)
     assert bench.force_un == 0.0
     assert heard.facts("left") == {"tool": "left", "peak_un": pytest.approx(highest)}
+
+
+def test_the_truth_of_an_earlier_run_is_kept_beside_the_new_one(tmp_path: Path) -> None:
+    file = tmp_path / "truth.jsonl"
+    for seed in (3, 4, 5):
+        written(file, seed).close()
+    found = [read_truth(tmp_path / name).seed for name in ("truth-1.jsonl", "truth-2.jsonl")]
+    assert [*found, read_truth(file).seed] == [3, 4, 5]
+
+
+def test_what_is_no_truth_is_not_written_over(tmp_path: Path) -> None:
+    notes = tmp_path / "notes.txt"
+    notes.write_text("my notes\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="give another name"):
+        written(notes)
+    assert notes.read_text(encoding="utf-8") == "my notes\n"
+    with pytest.raises(ConfigError, match="is no file"):
+        written(tmp_path)

@@ -117,6 +117,7 @@ class Campaign:
         policy: FailurePolicy,
         stopped: Callable[[], str | None],
         known: ResumePlan | None = None,
+        busy: Callable[[], str] = str,
     ) -> None:
         self.recipe = recipe
         self.store = store
@@ -127,7 +128,7 @@ class Campaign:
         )
         self._rule = StopRule(recipe.file.stop)
         self._policy = policy
-        self._stopped = stopped
+        self._stopped, self._busy = stopped, busy
         self._known = known
         self._changed = Condition()
         self._phase = CampaignPhase.READY
@@ -235,7 +236,7 @@ class Campaign:
         Raises
         ------
         NotAvailable
-            It was begun before.
+            It was begun before, or something else runs on the platform.
         """
         self._begin()
         self._thread = RunThread(self._carry_out, self.abort, self.recipe.name, self._policy)
@@ -247,7 +248,7 @@ class Campaign:
         Raises
         ------
         NotAvailable
-            It was begun before.
+            It was begun before, or something else runs on the platform.
         """
         self._begin()
         self._carry_out()
@@ -326,6 +327,8 @@ class Campaign:
         with self._changed:
             if self._phase is not CampaignPhase.READY:
                 raise NotAvailable(f"campaign {self.recipe.name} has already started")
+            if other := self._busy():
+                raise NotAvailable(f"campaign {self.recipe.name}: {other} is running; end it first")
             self._phase = CampaignPhase.RUNNING
         self._publish()
 

@@ -49,6 +49,8 @@ class CampaignHost:
         What lies on the twin's plate.
     provenance : Provenance
         What the run is made with, for the record.
+    busy : callable
+        Returns what runs on the platform, in words; empty for nothing.
     """
 
     rig: Applications
@@ -62,6 +64,7 @@ class CampaignHost:
     provenance: Provenance = field(default_factory=Provenance)
     world: str = ""
     plates: PlateHandler | None = None
+    busy: Callable[[], str] = str
 
 
 def read_recipe(path: Path) -> Recipe:
@@ -134,6 +137,7 @@ def open_campaign(recipe: Recipe, folder: Path, host: CampaignHost) -> Campaign:
             policy=host.policy,
             stopped=host.stopped,
             known=known,
+            busy=host.busy,
         )
         undo.pop_all()
     return campaign

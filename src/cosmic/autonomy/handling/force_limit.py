@@ -3,12 +3,16 @@
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Final
 
 from cosmic.autonomy.handling.context import HandlingContext
+from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.errors import NotAvailable
 
 logger = logging.getLogger(__name__)
+
+UNWATCHED: Final = "no force limit"
 
 
 def limit_of(work: HandlingContext) -> LimitSettings | None:
@@ -28,6 +32,17 @@ def arm_force_limit(work: HandlingContext) -> LimitSettings | None:
         if limit != before:
             work.daqco.set_limit(limit)
     return before
+
+
+def check_watched(work: HandlingContext) -> None:
+    """Raise `OperationFailed` where somebody took away the limit that a push has armed."""
+    limit = limit_of(work)
+    if work.settings.push.stop_un > 0.0 and (limit is None or not limit.armed):
+        raise OperationFailed(
+            UNWATCHED,
+            f"the limit of {work.settings.push.channel} was disarmed during a push; the probe goes "
+            "no further and is taken back. The next push arms it again",
+        )
 
 
 def put_back(work: HandlingContext, before: LimitSettings | None) -> None:

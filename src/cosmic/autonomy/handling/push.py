@@ -22,7 +22,12 @@ from cosmic.autonomy.bending.span import Freed, Span
 from cosmic.autonomy.handling.careful_move import CarefulMove
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
-from cosmic.autonomy.handling.force_limit import arm_force_limit, guard_probe, put_back
+from cosmic.autonomy.handling.force_limit import (
+    arm_force_limit,
+    check_watched,
+    guard_probe,
+    put_back,
+)
 from cosmic.autonomy.handling.grasp import see_held, shape_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.prepare import retract_probe
@@ -212,6 +217,7 @@ class OneSpan:
         move = self._to_travel(probe_um)
         if probe_um <= self._to_probe(y):
             return move
+        check_watched(self._work)
         return CarefulMove(move, self._work.forces, low_un, high_un)
 
     def _withdraw(self) -> Steps:

@@ -94,6 +94,8 @@ class ProcedureRun(Generic[W]):
         Told of a defect in an operation, which stops all motion.
     stopped : callable or None
         Returns why motion is stopped, or None; a run ends when it is, even where it only waits.
+    busy : callable or None
+        Returns what runs that this must not run beside, in words; empty for nothing.
     """
 
     def __init__(
@@ -104,11 +106,13 @@ class ProcedureRun(Generic[W]):
         policy: FailurePolicy,
         *,
         stopped: Callable[[], str | None] | None = None,
+        busy: Callable[[], str] | None = None,
     ) -> None:
         self.procedure = procedure
         self.work = work
         self.times = OperationTimes()
         self._policy = policy
+        self._busy = busy
         self._tree = ProcedureTreeState(outline_of(procedure.root), clock)
         self._tree.subscribe(self._on_event)
         self._control = RunControl(clock)
@@ -174,7 +178,7 @@ class ProcedureRun(Generic[W]):
         Raises
         ------
         NotAvailable
-            It was begun before.
+            It was begun before, or something runs that it must not run beside.
         """
         self._begin()
         self._thread = RunThread(self._carry_out, self.abort, self.name, self._policy)
@@ -190,7 +194,7 @@ class ProcedureRun(Generic[W]):
         ProcedureAborted
             It was aborted.
         NotAvailable
-            It was begun before.
+            It was begun before, or something runs that it must not run beside.
         """
         forbid_waiting_here(f"running {self.name!r}")
         self._begin()
@@ -284,6 +288,8 @@ class ProcedureRun(Generic[W]):
         with self._lock:
             if self._state is not RunState.READY:
                 raise NotAvailable(f"{self.name} has already started: make a new run")
+            if self._busy is not None and (other := self._busy()):
+                raise NotAvailable(f"{self.name}: {other} is running; end it first")
             self._state = RunState.PAUSING if self._control.stepping else RunState.RUNNING
         logger.info("%s begins", self.name)
         self._changed()

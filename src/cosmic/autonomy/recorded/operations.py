@@ -45,6 +45,7 @@ from cosmic.autonomy.shipped.single import (
     build_take,
 )
 from cosmic.autonomy.shipped.single_operation import SingleOperation
+from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.errors import ConfigError, DeviceTimeout
 from cosmic.mico.core.motion.positioner import positions_of
 from cosmic.vico.core.pixel_map import Floats
@@ -96,12 +97,21 @@ class Surroundings:
         Returns the folder that recordings go to.
     asks : callable
         Called with the words of a step that waits for the operator, and with "" when it goes on.
+    recording : Path or None
+        What a step has begun to record last.
     """
 
     marked: MarkedFibre | None = None
     folder: Callable[[], Path] = Path
     asks: Callable[[str], object] = str
     going_on: OperatorSignal = field(default_factory=OperatorSignal)
+    recording: Path | None = None
+
+    def end_recording(self, daqco: Daqco) -> None:
+        """End the recording that the replay began, where it still runs."""
+        state = daqco.recording
+        if self.recording is not None and state.active and state.path == self.recording:
+            daqco.stop_recording()
 
 
 def frame_of(work: HandlingContext, relative_to: str, marked: MarkedFibre | None) -> Floats:
@@ -218,7 +228,9 @@ class Recording(_OneStep):
             daqco.stop_recording()
         if step.name:
             plain = re.sub(r"[^\w-]+", "-", step.name).strip("-") or "recording"
-            daqco.start_recording(_free(self._around.folder(), plain))
+            path = _free(self._around.folder(), plain)
+            daqco.start_recording(path)
+            self._around.recording = daqco.recording.path or path
         yield SAFE_POINT
 
 

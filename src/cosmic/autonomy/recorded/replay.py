@@ -38,7 +38,14 @@ def replay_on(
     gripper = gripper_of(procedure, handling)
     built = build_recorded(procedure, handling.context(gripper), around)
     operations = tuple(each.operation for each in procedure.step if isinstance(each, OperationStep))
-    return handling.prepare_recorded(built, gripper, operations)
+    run = handling.prepare_recorded(built, gripper, operations)
+
+    def close() -> None:
+        if run.over:
+            around.end_recording(handling.context(gripper).daqco)
+
+    run.on_change(close)
+    return run
 
 
 def mark_one(rig: Applications) -> MarkedFibre:

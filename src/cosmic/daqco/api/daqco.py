@@ -8,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final, TypeVar
 
+from pydantic import ValidationError
 from PySide6.QtCore import Qt
 from typing_extensions import override
 
@@ -585,15 +586,27 @@ class Daqco(Declared):
         *,
         low: float | None = None,
         high: float | None = None,
-        hysteresis: float = 0.0,
+        hysteresis: float | None = None,
     ) -> None:
-        """Stop every actuator when `channel` leaves `low` to `high`; raises as `set_limit`."""
+        """Stop every actuator when `channel` leaves `low` to `high`; raises as `set_limit`.
+
+        What is not given stays as the limit of this channel has it: a force sensor breaks in both
+        directions. `set_limit` takes a side away.
+        """
+        now = next(
+            (each.settings for each in self.limits if each.settings.channel == channel), None
+        )
+        if now is not None:
+            low = now.low if low is None else low
+            high = now.high if high is None else high
+            hysteresis = now.hysteresis if hysteresis is None else hysteresis
         try:
             limit = LimitSettings(
-                channel=channel, low=low, high=high, hysteresis=hysteresis, armed=True
+                channel=channel, low=low, high=high, hysteresis=hysteresis or 0.0, armed=True
             )
-        except ValueError as exc:
-            raise ConfigError(f"limit of {channel}: {exc}") from None
+        except ValidationError as exc:
+            what = "; ".join(each["msg"].removeprefix("Value error, ") for each in exc.errors())
+            raise ConfigError(f"limit of {channel}: {what}") from None
         self.set_limit(limit)
 
     @command(timeout_s=SLOW_S)
@@ -613,7 +626,8 @@ class Daqco(Declared):
 
     @command(timeout_s=SLOW_S)
     def remove_limit(self, channel: str) -> None:
-        """Take away the limit of a channel."""
+        """Take away the limit of a channel; raises `ConfigError` where there is no such channel."""
+        self._check_limited(channel)
         self._application.guard.remove(channel)
         self.note_change()
 
@@ -625,9 +639,18 @@ class Daqco(Declared):
         ------
         NotAvailable
             The channel is still beyond it.
+        ConfigError
+            There is no such channel.
         """
+        self._check_limited(channel)
         self._application.guard.acknowledge(channel)
         self.note_change()
+
+    def _check_limited(self, channel: str) -> None:
+        guard = self._application.guard
+        if channel not in self.channels and channel not in guard.limits:
+            names = ", ".join(self.channels)
+            raise ConfigError(f"there is no active channel {channel!r}; there are {names}")
 
     # Outputs
 

@@ -73,8 +73,19 @@ class LensHandle(Declared):
         return self.scale.zoom(state.position_counts) if state is not None and known else None
 
     def state(self, axis: LensAxis) -> LensState | None:
-        """Return what was last heard of a motor; None before."""
-        motor = LensAxis.ZOOM if axis is LensAxis.ZOOM else LensAxis.FOCUS
+        """Return what was last heard of a motor, "zoom" or "focus"; None before.
+
+        Raises
+        ------
+        ConfigError
+            The lens has no such motor.
+        """
+        try:
+            motor = LensAxis(axis)
+        except ValueError:
+            raise ConfigError(
+                f"the lens has no motor {axis!r}; its motors are {', '.join(LensAxis)}"
+            ) from None
         found = self._motors.get(motor.name)
         return None if self.away else found
 
