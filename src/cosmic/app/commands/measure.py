@@ -74,12 +74,26 @@ def run(chosen: argparse.Namespace) -> int:
     """Measure files one after another; one that is refused does not keep the rest from it."""
     _check_options(chosen)
     folder: Path = chosen.output or Path("measured")
-    files = found_files(chosen.images)
     _check_apart(folder, chosen.images)
+    files = found_files(_without_results(chosen.images, folder))
     _prepare(folder, files, overwrite=chosen.overwrite)
     results = Results()
+    try:
+        interrupted = _interrupted(files, folder, chosen, results)
+    finally:  # what was measured is kept whatever ends the run
+        _write_tables(folder, results, spatial=chosen.focal_stack)
+    text = summary(results.measured, len(results.refused), len(results.pages_refused))
+    sys.stdout.write(encoded(f"{text}{folder}\n").decode())
+    if interrupted:
+        return INTERRUPTED
+    return 1 if results.refused or results.pages_refused else 0
+
+
+def _interrupted(
+    files: Sequence[Path], folder: Path, chosen: argparse.Namespace, results: Results
+) -> bool:
+    """Measure all files; return whether Ctrl-C ended it."""
     begun = 0
-    interrupted = False
     try:
         for begun, file in enumerate(files, start=1):
             _progress(f"{begun} of {len(files)}: {file.name}")
@@ -88,23 +102,21 @@ def run(chosen: argparse.Namespace) -> int:
             except CosmicError as exc:
                 results.refuse(file, exc)
     except KeyboardInterrupt:
-        interrupted = True
+        _say(
+            f"interrupted at file {begun} of {len(files)}; the tables hold what was measured "
+            "until then"
+        )
+        return True
     if sys.stderr.isatty():
         sys.stderr.write("\n")
-    write_csv(folder / TABLE, results.measured, spatial=chosen.focal_stack)
+    return False
+
+
+def _write_tables(folder: Path, results: Results, *, spatial: bool) -> None:
+    write_csv(folder / TABLE, results.measured, spatial=spatial)
     write_json(folder / WHOLE, results.measured)
     write_networks(folder / NETWORKS, results.measured)
     write_report(folder / REPORT, results)
-    if interrupted:
-        sys.stderr.write(
-            f"cosmic: interrupted at file {begun} of {len(files)}; the tables hold what was "
-            "measured until then\n"
-        )
-    text = summary(results.measured, len(results.refused), len(results.pages_refused))
-    sys.stdout.write(encoded(f"{text}{folder}\n").decode())
-    if interrupted:
-        return INTERRUPTED
-    return 1 if results.refused or results.pages_refused else 0
 
 
 def _check_options(chosen: argparse.Namespace) -> None:
@@ -155,6 +167,21 @@ def found_files(chosen: Sequence[Path]) -> list[Path]:
     if not files:
         raise RecordingError(f"no image ({', '.join(SUFFIXES)}) in the folder; name another")
     return files
+
+
+def _without_results(chosen: Sequence[Path], folder: Path) -> list[Path]:
+    """Leave out results of an earlier run that a pattern such as ``*.png`` named as well."""
+    if not (folder / WHOLE).exists():
+        return list(chosen)
+    apart = folder.resolve()
+    kept = [
+        each
+        for each in chosen
+        if not (OF_AN_IMAGE.fullmatch(each.name) and each.parent.resolve() == apart)
+    ]
+    if len(kept) < len(chosen):
+        _say(f"{folder}: results of an earlier run left out: {len(chosen) - len(kept)}")
+    return kept
 
 
 def _is_folder(path: Path) -> bool:

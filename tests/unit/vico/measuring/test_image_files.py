@@ -192,6 +192,36 @@ def test_a_damaged_page_does_not_keep_the_others_from_being_read(tmp_path: Path)
         list(read_images(file))
 
 
+@pytest.mark.parametrize("rows", [16, 300])
+def test_lzw_that_is_damaged_is_refused(tmp_path: Path, rows: int) -> None:
+    file = tmp_path / "packed.tif"
+    how = [cv2.IMWRITE_TIFF_COMPRESSION, 5, cv2.IMWRITE_TIFF_ROWSPERSTRIP, rows]
+    noise = np.random.default_rng(0).normal(0, 3, IMAGE.shape)
+    noisy = np.clip(IMAGE + noise, 0, 255).astype(np.uint8)
+    cv2.imwrite(str(file), noisy, how)
+    (page,) = read_images(file)
+    np.testing.assert_array_equal(page.pixels, noisy)
+    whole = file.read_bytes()
+    with tifffile.TiffFile(file) as written:
+        middle = written.pages[0].dataoffsets[-1] + written.pages[0].databytecounts[-1] // 2
+    for damage in (bytes(2000), np.random.default_rng(1).bytes(2000)):
+        begin = middle - len(damage)
+        file.write_bytes(whole[:begin] + damage + whole[middle:])
+        with pytest.raises(RecordingError, match="compressed by LZW, cannot be decoded"):
+            list(read_images(file))
+
+
+def test_colours_of_one_page_are_no_channels_and_no_pages(tmp_path: Path) -> None:
+    colour = np.stack([cv2.merge([IMAGE] * 3)] * 4)
+    sizes = ome(2.0, 2.0, axes="ZYXS") | {"PhysicalSizeZ": 5.0}
+    file = tmp_path / "rgb.ome.tif"
+    tifffile.imwrite(file, colour, ome=True, photometric="rgb", metadata=sizes)
+    pages = list(read_images(file))
+    assert len(pages) == 4
+    assert {each.besides_height for each in pages} == {""}
+    assert pages[0].step_um == 5.0
+
+
 def test_a_tiff_changed_at_any_place_is_read_or_refused(tmp_path: Path) -> None:
     bases = []
     small = IMAGE[::6, ::6].copy()

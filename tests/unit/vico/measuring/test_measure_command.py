@@ -78,6 +78,22 @@ def test_ctrl_c_keeps_what_was_measured(
     assert "interrupted at file 2 of 2" in capsys.readouterr().err
 
 
+def test_an_error_nobody_foresaw_keeps_what_was_measured(
+    image: Path, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cv2.imwrite(str(image.with_name("b.png")), IMAGE)
+
+    def until_second(page: FileImage, size: float | None = None) -> Measurement:
+        if page.name == "b.png":
+            raise AssertionError("a defect")
+        return measure_page(page, size)
+
+    monkeypatch.setattr(command, "measure_page", until_second)
+    with pytest.raises(AssertionError):
+        main(["measure", str(image.parent), "--output", str(out)])
+    assert [row["image"] for row in rows_of(out / "fibres.csv")] == ["a.png"]
+
+
 def test_a_name_that_is_no_utf_8_is_written_in_ascii(image: Path, out: Path) -> None:
     name = os.fsdecode(b"odd\xff.png")
     try:
@@ -224,6 +240,10 @@ def test_results_are_not_measured_as_images(
     assert main(["measure", folder, "--output", str(out)]) == 0
     assert [row["image"] for row in rows_of(out / "fibres.csv")] == ["a.png"]
     assert "results of an earlier run left out: 1" in capsys.readouterr().err
+    every = sorted(str(each) for each in image.parent.glob("*.png"))
+    assert len(every) == 2
+    assert main(["measure", *every, "--output", folder, "--overwrite"]) == 0
+    assert [row["image"] for row in rows_of(image.parent / "fibres.csv")] == ["a.png"]
 
 
 def test_hidden_files_of_macos_and_folders_in_folders_are_left_out(image: Path, out: Path) -> None:

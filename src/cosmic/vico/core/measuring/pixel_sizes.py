@@ -130,7 +130,8 @@ def imagej_step_um(metadata: Mapping[str, object]) -> float | None:
 class OmeImages:
     """The images that an OME-TIFF names, and which of its pages belong to which."""
 
-    def __init__(self, text: str, pages: int) -> None:
+    def __init__(self, text: str, pages: int, layers: int = 1) -> None:
+        self._layers = max(1, layers)
         self._pixels: list[ElementTree.Element] = []
         self._by_page: dict[int, ElementTree.Element] = {}
         self.declared = pages
@@ -141,7 +142,7 @@ class OmeImages:
             return
         self._pixels = [each for each in root.iter() if _tag(each) == "Pixels"]
         for pixels in self._pixels:
-            for first, count in _planes(pixels, root.get("UUID")):
+            for first, count in self._planes(pixels, root.get("UUID")):
                 self.declared = max(self.declared, first + count)
                 for page in range(first, min(first + count, pages)):
                     self._by_page.setdefault(page, pixels)
@@ -179,11 +180,28 @@ class OmeImages:
             return f"{len(self._pixels)} images"
         if not self._pixels:
             return ""
-        return axes_in_words(_channels(self._pixels[0]), _whole(self._pixels[0], "SizeT"))
+        return axes_in_words(self._channels(self._pixels[0]), _whole(self._pixels[0], "SizeT"))
 
     def _of(self, page: int) -> ElementTree.Element | None:
         alone = self._pixels[0] if len(self._pixels) == 1 else None
         return self._by_page.get(page, alone)
+
+    def _channels(self, pixels: ElementTree.Element) -> int:
+        """Return how many channels are pages of their own; the colours of a page are one."""
+        return max(1, _whole(pixels, "SizeC") // self._layers)
+
+    def _planes(self, pixels: ElementTree.Element, own: str | None) -> Iterator[tuple[int, int]]:
+        """Yield first page and number of pages of an image, of those in this file."""
+        every = _whole(pixels, "SizeZ") * _whole(pixels, "SizeT") * self._channels(pixels)
+        for data in pixels:
+            if _tag(data) != "TiffData":
+                continue
+            file = next((each.text for each in data if _tag(each) == "UUID"), own)
+            if own is not None and file != own:
+                continue
+            first = _whole(data, "IFD") if "IFD" in data.attrib else 0
+            alone = 1 if "IFD" in data.attrib else every
+            yield first, _whole(data, "PlaneCount") if "PlaneCount" in data.attrib else alone
 
 
 def axes_in_words(channels: int, times: int) -> str:
@@ -218,25 +236,6 @@ def _tag(element: ElementTree.Element) -> str:
 def _whole(element: ElementTree.Element, name: str) -> int:
     text = element.get(name, "1")
     return int(text) if text.isdecimal() else 1
-
-
-def _channels(pixels: ElementTree.Element) -> int:
-    """Return how many channels are pages of their own; the colours of a page are one."""
-    return sum(_tag(each) == "Channel" for each in pixels) or _whole(pixels, "SizeC")
-
-
-def _planes(pixels: ElementTree.Element, own: str | None) -> Iterator[tuple[int, int]]:
-    """Yield first page and number of pages of an image, of those in this file."""
-    every = _whole(pixels, "SizeZ") * _whole(pixels, "SizeT") * _channels(pixels)
-    for data in pixels:
-        if _tag(data) != "TiffData":
-            continue
-        file = next((each.text for each in data if _tag(each) == "UUID"), own)
-        if own is not None and file != own:
-            continue
-        first = _whole(data, "IFD") if "IFD" in data.attrib else 0
-        alone = 1 if "IFD" in data.attrib else every
-        yield first, _whole(data, "PlaneCount") if "PlaneCount" in data.attrib else alone
 
 
 def _physical_um(pixels: ElementTree.Element, axis: str) -> float | None:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from cosmic.frame.errors import RecordingError
 from cosmic.vico.core.measuring.file_image import FileImage, Refused, reading, refuse
+from cosmic.vico.core.measuring.lzw import lzw_is_whole
 from cosmic.vico.core.measuring.pixel_sizes import (
     UNKNOWN,
     OmeImages,
@@ -25,6 +26,7 @@ from cosmic.vico.core.vision.grey import MOST_SIDE_PX
 if TYPE_CHECKING:
     import tifffile
 
+LZW = 5
 TAG_UM = {2: 25_400.0, 3: 1e4}
 # What tifffile decodes by itself: none, deflate (three numbers), PackBits.
 PLAIN_COMPRESSIONS = (1, 8, 32946, 32773, 50013)
@@ -120,8 +122,9 @@ class _Metadata:
 
     def __init__(self, file: "tifffile.TiffFile") -> None:
         pages = len(file.pages)
+        first: Any = file.pages[0]  # by type a frame as well, which the first one never is
         self._imagej: dict[str, Any] = file.imagej_metadata or {}
-        self._ome = OmeImages(file.ome_metadata or "", pages)
+        self._ome = OmeImages(file.ome_metadata or "", pages, int(first.samplesperpixel))
         self.declared = self._ome.declared
         if file.is_imagej:
             self.declared = max(self.declared, int(self._imagej.get("images", 1)))
@@ -208,6 +211,28 @@ class _OpenCv:
         return np.asarray(pages[0]) if done and pages else None
 
 
+def _check_lzw(where: str, page: Any, first: Any) -> None:
+    """Refuse a page of which a strip or tile is damaged; OpenCV makes something up for it."""
+    if int(first.fillorder) != 1:
+        return
+    layers = int(first.samplesperpixel) if int(first.planarconfig) == 1 else 1
+    height, width = int(first.imagelength), int(first.imagewidth)
+    rows, columns = int(first.rowsperstrip), width
+    if first.is_tiled:
+        rows, columns = int(first.tilelength), int(first.tilewidth)
+    row_bytes = (columns * layers * int(first.bitspersample) + 7) // 8
+    strips = max(1, -(-height // max(1, rows)))
+    file = page.parent.filehandle
+    for number, (at, count) in enumerate(zip(page.dataoffsets, page.databytecounts, strict=True)):
+        left = rows if first.is_tiled else min(rows, height - number % strips * rows)
+        file.seek(at)
+        if not lzw_is_whole(file.read(count), left * row_bytes):
+            raise RecordingError(
+                f"{where}: is damaged: a part of its pixels, compressed by LZW, cannot be decoded; "
+                "copy it again from where it was made"
+            )
+
+
 def _page_pixels(where: str, page: Any, index: int, opencv: _OpenCv) -> Layers:
     """Return the pixels of a page, colours in the order blue, green, red."""
     first = _first(page)
@@ -215,6 +240,8 @@ def _page_pixels(where: str, page: Any, index: int, opencv: _OpenCv) -> Layers:
     compression = int(first.compression)
     if compression in PLAIN_COMPRESSIONS and int(first.bitspersample) in PLAIN_BITS:
         return _in_colours(page.asarray(), first)
+    if compression == LZW:
+        _check_lzw(where, page, first)
     pixels = opencv.page(index) if compression in DECODED_COMPRESSIONS else None
     if pixels is None:
         kind = getattr(first.compression, "name", compression)
