@@ -34,8 +34,9 @@ OF_AN_IMAGE = re.compile(
     r"\d{4,}-.*-(overlay\.png|rois\.zip|napari\.csv|sharp\.png|heights\.tif)", re.DOTALL
 )
 BARS = 10
+LONGEST_NAME = 255
 LONGEST_STEM_BYTES = 200
-"""What is added to it has to fit into the 255 bytes of a file name."""
+"""What is added to it has to fit into the name of a file as well."""
 MOST_UM = 1e6
 INTERRUPTED = 130
 """Exit code that a shell has for Ctrl-C."""
@@ -52,8 +53,9 @@ class Results:
 
     def refuse(self, file: Path, problem: CosmicError, *, page: str = "") -> None:
         """Note and show that a file, or one of its pages, is not measured."""
-        said = str(problem).removeprefix(f"{file}: ")
-        line = f"{file}: {page}{': ' if page else ''}{said}"
+        name = str(file) if len(file.name) <= LONGEST_NAME else str(file)[:80]
+        said = str(problem).removeprefix(f"{name}: ")
+        line = f"{name}: {page}{': ' if page else ''}{said}"
         (self.pages_refused if page else self.refused).append(line)
         _say(line)
 
@@ -215,7 +217,7 @@ def summary(measured: Sequence[Measurement], refused: int, pages_refused: int = 
     certain = sum(fibre.certain for fibre in fibres)
     lines = [f"images measured: {len(measured)}, files refused: {refused}"]
     if pages_refused:
-        lines.append(f"pages of other files refused: {pages_refused}")
+        lines.append(f"pages or parts of other files refused: {pages_refused}")
     lines.append(f"fibres: {len(fibres)}, certain: {certain}")
     lengths = [length for each in measured for length in each.lengths_um]
     if lengths:
@@ -249,7 +251,7 @@ def write_report(path: Path, results: Results) -> None:
         lines += [f"| {count} | {doubt} |" for doubt, count in doubts.most_common()]
     for title, listed in {
         "Files refused": refused,
-        "Pages refused": results.pages_refused,
+        "Pages and parts refused": results.pages_refused,
         "Pixel sizes not used": list(results.sizes_not_used),
     }.items():
         if listed:

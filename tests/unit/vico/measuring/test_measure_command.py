@@ -57,8 +57,8 @@ def test_pages_that_cannot_be_measured_do_not_cost_the_others(
     said = capsys.readouterr()
     assert "damaged.tif: page 2: cannot be read" in said.err
     assert "small.tif: page 2: " in said.err
-    assert "pages of other files refused: 2" in said.out
-    assert "## Pages refused" in (out / "report.md").read_text(encoding="utf-8")
+    assert "pages or parts of other files refused: 2" in said.out
+    assert "## Pages and parts refused" in (out / "report.md").read_text(encoding="utf-8")
 
 
 def test_ctrl_c_keeps_what_was_measured(
@@ -121,7 +121,7 @@ def test_a_name_that_no_file_can_have_is_refused(
     asked = ["measure", "x" * 300, str(image.with_name("absent.tif")), str(image)]
     assert main([*asked, "--output", str(out)]) == 1
     said = capsys.readouterr().err
-    assert "too long" in said
+    assert f"cosmic: {'x' * 80}: cannot be read (File name too long)" in said
     assert "absent.tif: is missing" in said
     assert len(rows_of(out / "fibres.csv")) == 1
 
