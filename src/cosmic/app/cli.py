@@ -172,14 +172,21 @@ def _add_file_commands(
     repair.add_argument("--ended", action="store_true", help="no program writes them any more")
 
 
+def _path(text: str) -> Path:
+    """Return a path; an empty text, such as that of a variable not set, is none."""
+    if not text:
+        raise argparse.ArgumentTypeError("is empty; name a file or a folder")
+    return Path(text)
+
+
 def _add_measure(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     measure = commands.add_parser("measure", help="measure the fibres on images of any origin")
-    measure.add_argument("images", type=Path, nargs="+", metavar="IMAGE", help="files or folders")
+    measure.add_argument("images", type=_path, nargs="+", metavar="IMAGE", help="files or folders")
     measure.add_argument(
         "--pixel-size-um", type=float, metavar="UM", help="instead of what the files say"
     )
     measure.add_argument(
-        "--output", type=Path, metavar="FOLDER", help="results (default: ./measured)"
+        "--output", type=_path, metavar="FOLDER", help="results (default: ./measured)"
     )
     measure.add_argument(
         "--every", type=int, default=1, metavar="N", help="of a video each N-th image only"

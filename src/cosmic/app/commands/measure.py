@@ -1,16 +1,22 @@
 """``cosmic measure``: the fibres on images from anywhere, without a platform."""
 
 import argparse
+import os
+import re
 import sys
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from cosmic.frame.errors import CosmicError, RecordingError
+from cosmic.frame.errors import ConfigError, CosmicError, RecordingError
 from cosmic.vico.api.measure import (
+    NOT_KNOWN,
     SUFFIXES,
+    FileImage,
     Measurement,
+    check_pixel_size,
+    encoded,
     measure_page,
     measure_stack,
     read_images,
@@ -24,32 +30,124 @@ from cosmic.vico.api.measure import (
 )
 
 TABLE, WHOLE, NETWORKS, REPORT = "fibres.csv", "fibres.json", "networks.csv", "report.md"
+OF_AN_IMAGE = re.compile(
+    r"\d{4,}-.*-(overlay\.png|rois\.zip|napari\.csv|sharp\.png|heights\.tif)", re.DOTALL
+)
 BARS = 10
+LONGEST_NAME = 255
+LONGEST_STEM_BYTES = 200
+"""What is added to it has to fit into the name of a file as well."""
+MOST_UM = 1e6
+INTERRUPTED = 130
+"""Exit code that a shell has for Ctrl-C."""
+
+
+@dataclass(slots=True)
+class Results:
+    """What was measured so far, and what was not."""
+
+    measured: list[Measurement] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+    pages_refused: list[str] = field(default_factory=list)
+    sizes_not_used: dict[str, None] = field(default_factory=dict)
+
+    def refuse(self, file: Path, problem: CosmicError, *, page: str = "") -> None:
+        """Note and show that a file, or one of its pages, is not measured."""
+        name = str(file) if len(file.name) <= LONGEST_NAME else str(file)[:80]
+        said = str(problem).removeprefix(f"{name}: ")
+        line = f"{name}: {page}{': ' if page else ''}{said}"
+        (self.pages_refused if page else self.refused).append(line)
+        _say(line)
+
+    def refuse_page(self, problem: RecordingError) -> None:
+        """Note and show that a page cannot be read; the problem says which."""
+        self.pages_refused.append(str(problem))
+        _say(str(problem))
+
+    def note_size(self, file: Path, page: FileImage) -> None:
+        """Show once for a file why the pixel size that it states is not used."""
+        line = f"{file}: pixel size {page.pixel_size_from}"
+        if page.pixel_size_from.startswith(f"{NOT_KNOWN}: ") and line not in self.sizes_not_used:
+            self.sizes_not_used[line] = None
+            _say(line)
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Measure files one after another; one that is refused does not keep the rest from it."""
-    files = found_files(chosen.images)
+    _check_options(chosen)
     folder: Path = chosen.output or Path("measured")
-    _prepare(folder, overwrite=chosen.overwrite)
-    measured: list[Measurement] = []
-    refused: list[str] = []
-    for number, file in enumerate(files, start=1):
-        _progress(f"{number} of {len(files)}: {file.name}")
-        try:
-            measured += _measured(file, folder, f"{number:04d}-{file.stem}", chosen)
-        except CosmicError as exc:
-            said = str(exc).removeprefix(f"{file}: ")
-            refused.append(f"{file.name}: {said}")
-            sys.stderr.write(f"\ncosmic: {file}: {said}\n")
+    _check_apart(folder, chosen.images)
+    files = found_files(_without_results(chosen.images, folder))
+    _prepare(folder, files, overwrite=chosen.overwrite)
+    results = Results()
+    try:
+        interrupted = _interrupted(files, folder, chosen, results)
+    finally:  # what was measured is kept whatever ends the run
+        _write_tables(folder, results, spatial=chosen.focal_stack)
+    text = summary(results.measured, len(results.refused), len(results.pages_refused))
+    sys.stdout.write(encoded(f"{text}{folder}\n").decode())
+    if interrupted:
+        return INTERRUPTED
+    return 1 if results.refused or results.pages_refused else 0
+
+
+def _interrupted(
+    files: Sequence[Path], folder: Path, chosen: argparse.Namespace, results: Results
+) -> bool:
+    """Measure all files; return whether Ctrl-C ended it."""
+    begun = 0
+    try:
+        for begun, file in enumerate(files, start=1):
+            _progress(f"{begun} of {len(files)}: {file.name}")
+            try:
+                _measure_file(file, folder, _stem(begun, file), chosen, results)
+            except CosmicError as exc:
+                results.refuse(file, exc)
+    except KeyboardInterrupt:
+        _say(
+            f"interrupted at file {begun} of {len(files)}; the tables hold what was measured "
+            "until then"
+        )
+        return True
     if sys.stderr.isatty():
         sys.stderr.write("\n")
-    write_csv(folder / TABLE, measured)
-    write_json(folder / WHOLE, measured)
-    write_networks(folder / NETWORKS, measured)
-    write_report(folder / REPORT, measured, refused)
-    sys.stdout.write(summary(measured, len(refused)) + f"{folder}\n")
-    return 1 if refused else 0
+    return False
+
+
+def _write_tables(folder: Path, results: Results, *, spatial: bool) -> None:
+    write_csv(folder / TABLE, results.measured, spatial=spatial)
+    write_json(folder / WHOLE, results.measured)
+    write_networks(folder / NETWORKS, results.measured)
+    write_report(folder / REPORT, results)
+
+
+def _check_options(chosen: argparse.Namespace) -> None:
+    """Refuse values that nothing can be done with, before a file is opened."""
+    if not chosen.every >= 1:
+        raise ConfigError(f"--every is 1 or more, not {chosen.every}")
+    check_pixel_size(chosen.pixel_size_um)
+    step, distance = chosen.step_um, chosen.lens_distance_um
+    if not chosen.focal_stack and (step is not None or distance != float("inf")):
+        raise ConfigError(
+            "--step-um and --lens-distance-um are for a focal stack; say --focal-stack, or leave "
+            "them out"
+        )
+    if step is not None and not 0 < step <= MOST_UM:
+        raise ConfigError(f"--step-um is above 0 and up to {MOST_UM:g} µm, not {step:g}")
+    if not distance > 0:
+        raise ConfigError(f"--lens-distance-um is above 0 µm, not {distance:g}")
+
+
+def _say(line: str) -> None:
+    sys.stderr.write(f"{chr(10) if sys.stderr.isatty() else ''}cosmic: {line}\n")
+
+
+def _stem(number: int, file: Path) -> str:
+    """Return what the names of a file's results begin with, short enough for more to follow."""
+    stem = f"{number:04d}-{file.stem}"
+    while len(os.fsencode(stem)) > LONGEST_STEM_BYTES:
+        stem = stem[:-1]
+    return stem
 
 
 def _progress(text: str) -> None:
@@ -60,26 +158,67 @@ def _progress(text: str) -> None:
 
 
 def found_files(chosen: Sequence[Path]) -> list[Path]:
-    """Return the files, those of folders by name; raises `RecordingError` where there is none."""
+    """Return the files, those of folders by name; raises `RecordingError` where there is none.
+
+    Folders in them are not looked into. Results of an earlier run are left out, and so are the
+    files ``._*`` that macOS writes beside others.
+    """
     files: list[Path] = []
     for each in chosen:
-        if each.is_dir():
-            files += sorted(one for one in each.iterdir() if one.suffix.lower() in SUFFIXES)
-        else:
-            files.append(each)
+        files += _images_in(each) if _is_folder(each) else [each]
     if not files:
         raise RecordingError(f"no image ({', '.join(SUFFIXES)}) in the folder; name another")
     return files
 
 
-def summary(measured: Sequence[Measurement], refused: int) -> str:
+def _without_results(chosen: Sequence[Path], folder: Path) -> list[Path]:
+    """Leave out results of an earlier run that a pattern such as ``*.png`` named as well."""
+    if not (folder / WHOLE).exists():
+        return list(chosen)
+    apart = folder.resolve()
+    kept = [
+        each
+        for each in chosen
+        if not (OF_AN_IMAGE.fullmatch(each.name) and each.parent.resolve() == apart)
+    ]
+    if len(kept) < len(chosen):
+        _say(f"{folder}: results of an earlier run left out: {len(chosen) - len(kept)}")
+    return kept
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError:  # a name that no file can have is refused where it is read
+        return False
+
+
+def _images_in(folder: Path) -> list[Path]:
+    try:
+        there = sorted(folder.iterdir())
+    except OSError as exc:
+        raise RecordingError(f"{folder}: cannot be listed ({exc.strerror or exc})") from exc
+    found = [
+        each
+        for each in there
+        if each.suffix.lower() in SUFFIXES and not each.name.startswith("._") and not each.is_dir()
+    ]
+    if folder / WHOLE not in there:
+        return found
+    images = [each for each in found if not OF_AN_IMAGE.fullmatch(each.name)]
+    if len(images) < len(found):
+        _say(f"{folder}: results of an earlier run left out: {len(found) - len(images)}")
+    return images
+
+
+def summary(measured: Sequence[Measurement], refused: int, pages_refused: int = 0) -> str:
     """Return what was found, in lines."""
     fibres = [fibre for each in measured for fibre in each.fibres]
     certain = sum(fibre.certain for fibre in fibres)
-    lines = [
-        f"images measured: {len(measured)}, files refused: {refused}",
-        f"fibres: {len(fibres)}, certain: {certain}",
-    ]
+    lines = [f"images measured: {len(measured)}, files refused: {refused}"]
+    if pages_refused:
+        lines.append(f"pages or parts of other files refused: {pages_refused}")
+    lines.append(f"fibres: {len(fibres)}, certain: {certain}")
     lengths = [length for each in measured for length in each.lengths_um]
     if lengths:
         mean = sum(lengths) / len(lengths)
@@ -94,7 +233,7 @@ def summary(measured: Sequence[Measurement], refused: int) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def write_report(path: Path, measured: Sequence[Measurement], refused: Sequence[str]) -> None:
+def write_report(path: Path, results: Results) -> None:
     """Write what was found as a page: counts, lengths, reasons to doubt, files refused.
 
     Raises
@@ -102,20 +241,23 @@ def write_report(path: Path, measured: Sequence[Measurement], refused: Sequence[
     RecordingError
         It cannot be written.
     """
-    lines = [
-        "# Fibres measured",
-        "",
-        *(f"- {each}" for each in summary(measured, len(refused)).split("\n") if each),
-    ]
+    measured, refused = results.measured, results.refused
+    text = summary(measured, len(refused), len(results.pages_refused))
+    lines = ["# Fibres measured", "", *(f"- {each}" for each in text.split("\n") if each)]
     lines += _lengths([length for each in measured for length in each.lengths_um])
     doubts = Counter(doubt for each in measured for fibre in each.fibres for doubt in fibre.doubts)
     if doubts:
         lines += ["", "## Why fibres are not certain", "", "| fibres | reason |", "|---:|---|"]
         lines += [f"| {count} | {doubt} |" for doubt, count in doubts.most_common()]
-    if refused:
-        lines += ["", "## Files refused", "", *(f"- {each}" for each in refused)]
+    for title, listed in {
+        "Files refused": refused,
+        "Pages and parts refused": results.pages_refused,
+        "Pixel sizes not used": list(results.sizes_not_used),
+    }.items():
+        if listed:
+            lines += ["", f"## {title}", "", *(f"- {each}" for each in listed)]
     try:
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        path.write_bytes(encoded("\n".join(lines) + "\n"))
     except OSError as exc:
         raise RecordingError(f"{path}: cannot be written ({exc.strerror or exc})") from exc
 
@@ -135,20 +277,28 @@ def _lengths(lengths_um: Sequence[float]) -> list[str]:
     return ["", "## Lengths of certain fibres", "", "| µm | fibres |", "|---|---:|", *rows]
 
 
-def _measured(file: Path, folder: Path, stem: str, chosen: argparse.Namespace) -> list[Measurement]:
+def _measure_file(
+    file: Path, folder: Path, stem: str, chosen: argparse.Namespace, results: Results
+) -> None:
     if chosen.focal_stack:
-        return [_measured_stack(file, folder, stem, chosen)]
-    found = []
-    for number, page in enumerate(read_images(file, chosen.every), start=1):
-        if number > 1:
+        results.measured.append(_measured_stack(file, folder, stem, chosen))
+        return
+    pages = read_images(file, chosen.every, results.refuse_page)
+    for page in pages:
+        if page.number > 1:
             _progress(page.name)
-        one = measure_page(page, chosen.pixel_size_um)
-        name = stem if number == 1 else f"{stem}-page-{number}"
+        if chosen.pixel_size_um is None:
+            results.note_size(file, page)
+        try:
+            one = replace(measure_page(page, chosen.pixel_size_um), file=str(file))
+        except CosmicError as exc:
+            results.refuse(file, exc, page=page.name.removeprefix(file.name).strip())
+            continue
+        name = stem if page.number == 1 else f"{stem}-page-{page.number}"
         write_overlay(folder / f"{name}-overlay.png", page.pixels, one)
         write_rois(folder / f"{name}-rois.zip", one)
         write_napari(folder / f"{name}-napari.csv", one)
-        found.append(one)
-    return found
+        results.measured.append(one)
 
 
 def _measured_stack(file: Path, folder: Path, stem: str, chosen: argparse.Namespace) -> Measurement:
@@ -160,7 +310,7 @@ def _measured_stack(file: Path, folder: Path, stem: str, chosen: argparse.Namesp
         step_um=chosen.step_um,
         lens_distance_um=chosen.lens_distance_um,
     )
-    one = replace(stack.measurement, name=file.name)
+    one = replace(stack.measurement, name=file.name, file=str(file))
     write_overlay(folder / f"{stem}-overlay.png", stack.sharp, one)
     write_rois(folder / f"{stem}-rois.zip", one)
     write_napari(folder / f"{stem}-napari.csv", one)
@@ -168,13 +318,33 @@ def _measured_stack(file: Path, folder: Path, stem: str, chosen: argparse.Namesp
     return one
 
 
-def _prepare(folder: Path, *, overwrite: bool) -> None:
-    there = [each for each in (folder / TABLE, folder / WHOLE) if each.exists()]
+def _check_apart(folder: Path, chosen: Sequence[Path]) -> None:
+    """Refuse results among the images: the next run would measure overlays as images."""
+    for each in chosen:
+        if _is_folder(each) and each.resolve() == folder.resolve():
+            raise RecordingError(f"{folder}: holds the images; choose another folder with --output")
+
+
+def _prepare(folder: Path, files: Sequence[Path], *, overwrite: bool) -> None:
+    """Make the folder, without results of an earlier run; these go only where that is said."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        names = (TABLE, WHOLE, NETWORKS, REPORT)
+        there = sorted(
+            each
+            for each in folder.iterdir()
+            if each.name in names or OF_AN_IMAGE.fullmatch(each.name)
+        )
+    except OSError as exc:
+        raise RecordingError(f"{folder}: cannot be created ({exc.strerror or exc})") from exc
     if there and not overwrite:
         raise RecordingError(
             f"{there[0]}: exists; choose another folder with --output, or say --overwrite"
         )
+    images = {each.resolve() for each in files}
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        for each in there:
+            if each.resolve() not in images:
+                each.unlink()
     except OSError as exc:
-        raise RecordingError(f"{folder}: cannot be created ({exc.strerror or exc})") from exc
+        raise RecordingError(f"{folder}: cannot be cleared ({exc.strerror or exc})") from exc

@@ -2,8 +2,10 @@
 
 from cosmic.vico.core.measuring.corrections import Corrections as Corrections
 from cosmic.vico.core.measuring.corrections import side_file as side_file
+from cosmic.vico.core.measuring.file_image import FileImage as FileImage
 from cosmic.vico.core.measuring.image_files import SUFFIXES as SUFFIXES
 from cosmic.vico.core.measuring.image_files import read_images as read_images
+from cosmic.vico.core.measuring.measured_files import encoded as encoded
 from cosmic.vico.core.measuring.measured_files import write_csv as write_csv
 from cosmic.vico.core.measuring.measured_files import write_heights as write_heights
 from cosmic.vico.core.measuring.measured_files import write_json as write_json
@@ -13,9 +15,11 @@ from cosmic.vico.core.measuring.measured_files import write_overlay as write_ove
 from cosmic.vico.core.measuring.measured_files import write_rois as write_rois
 from cosmic.vico.core.measuring.measurement import MeasuredStack as MeasuredStack
 from cosmic.vico.core.measuring.measurement import Measurement as Measurement
+from cosmic.vico.core.measuring.measurement import check_pixel_size as check_pixel_size
 from cosmic.vico.core.measuring.measurement import measure as measure
 from cosmic.vico.core.measuring.measurement import measure_page as measure_page
 from cosmic.vico.core.measuring.measurement import measure_stack as measure_stack
+from cosmic.vico.core.measuring.pixel_sizes import NOT_KNOWN as NOT_KNOWN
 from cosmic.vico.core.vision.focal_stack import FocalStack as FocalStack
 from cosmic.vico.core.vision.focal_stack import HeightMap as HeightMap
 from cosmic.vico.core.vision.held import Clamp as Clamp

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.frame.errors import RecordingError
-from cosmic.vico.core.measuring.measurement import Measurement
+from cosmic.vico.core.measuring.measurement import Measurement, columns
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.focal_stack import HeightMap
 from cosmic.vico.core.vision.grey import grey_image
@@ -25,15 +25,27 @@ NETWORK_BGR, BUNDLE_BGR = (220, 180, 40), (200, 60, 200)
 ROI_VERSION, POLYLINE, SUB_PIXEL = 228, 5, 128
 
 
-def write_csv(path: Path, measured: Sequence[Measurement]) -> None:
-    """Write a row for each fibre; raises `RecordingError`."""
+def write_csv(path: Path, measured: Sequence[Measurement], *, spatial: bool = False) -> None:
+    """Write a row for each fibre, and the names of the columns in any case.
+
+    Parameters
+    ----------
+    spatial : bool
+        Name the columns of focal stacks even where no fibre was found on any.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be written.
+    """
     rows = [row for each in measured for row in each.rows()]
     text = io.StringIO(newline="")
-    if rows:
-        writer = csv.DictWriter(text, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    _write(path, text.getvalue().encode())
+    writer = csv.DictWriter(
+        text, columns(spatial=spatial or any(each.spatial for each in measured))
+    )
+    writer.writeheader()
+    writer.writerows(rows)
+    _write(path, encoded(text.getvalue()))
 
 
 def write_networks(path: Path, measured: Sequence[Measurement]) -> None:
@@ -45,7 +57,7 @@ def write_networks(path: Path, measured: Sequence[Measurement]) -> None:
     writer = csv.DictWriter(text, list(rows[0]))
     writer.writeheader()
     writer.writerows(rows)
-    _write(path, text.getvalue().encode())
+    _write(path, encoded(text.getvalue()))
 
 
 def write_napari(path: Path, measured: Measurement) -> None:
@@ -67,6 +79,7 @@ def write_json(path: Path, measured: Sequence[Measurement]) -> None:
     images = [
         {
             "image": each.name,
+            "file": each.file,
             "rows": each.shape[0],
             "columns": each.shape[1],
             "pixel_size_um": each.pixel_size_um,
@@ -79,7 +92,7 @@ def write_json(path: Path, measured: Sequence[Measurement]) -> None:
         }
         for each in measured
     ]
-    _write(path, json.dumps({"images": images}, indent=1, ensure_ascii=False).encode())
+    _write(path, encoded(json.dumps({"images": images}, indent=1, ensure_ascii=False)))
 
 
 def _lines_um(measured: Measurement) -> list[dict[str, object]]:
@@ -180,6 +193,11 @@ def roi(fibre: Fibre) -> bytes:
     whole = np.round(points - low).astype(">i2").T.tobytes()
     data: bytes = head + whole + points.astype(">f4").T.tobytes()
     return data
+
+
+def encoded(text: str) -> bytes:
+    r"""Return text as UTF-8; bytes of a file's name that are none become such as ``\udcff``."""
+    return text.encode("utf-8", "backslashreplace")
 
 
 def _write(path: Path, data: bytes) -> None:

@@ -2,13 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from cosmic.frame.errors import ConfigError, NotAvailable
-from cosmic.vico.core.measuring.image_files import NOT_KNOWN, FileImage, read_images
+from cosmic.vico.core.measuring.image_files import FileImage, read_images
+from cosmic.vico.core.measuring.pixel_sizes import LARGEST_UM, NOT_KNOWN, SMALLEST_UM
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.finding import find_fibres
 from cosmic.vico.core.vision.focal_stack import (
@@ -28,8 +30,25 @@ FEWEST_DENSE = 12
 
 Value = str | int | float | bool | None
 
+UNITS = ("px", "um")
 LENGTHS = ("length", "length_std", "projected_length", "width", "width_std")
 PLAIN = ("curl", "kinks", "orientation_deg", "contrast")
+SPATIAL = (
+    "spatial_length_um",
+    "spatial_length_std_um",
+    "tilt_deg",
+    "tilt_std_deg",
+    "lowest_um",
+    "highest_um",
+    "spatial_doubt",
+)
+
+
+def columns(*, spatial: bool) -> tuple[str, ...]:
+    """Return the columns of a row, those of a focal stack among them; also without a fibre."""
+    both = [f"{name}_{unit}" for name in (*LENGTHS, "length_low", "length_high") for unit in UNITS]
+    first = ("image", "fibre", "certain", "probability", "pixel_size_um")
+    return (*first, *both, *PLAIN, *(SPATIAL if spatial else ()), "doubts", "file")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +71,8 @@ class Measurement:
         Where so much stands out that no single fibre is certain.
     spatial : tuple of SpatialFibre or str
         Of a focal stack, for each fibre: how it lies in space, or why that is not known.
+    file : str
+        The file as it was asked for, with its folders; empty for an array.
     """
 
     name: str
@@ -61,6 +82,7 @@ class Measurement:
     pixel_size_from: str
     network: Network | None = None
     spatial: tuple[SpatialFibre | str, ...] = ()
+    file: str = ""
 
     @property
     def lengths_um(self) -> tuple[float, ...]:
@@ -97,6 +119,7 @@ class Measurement:
             found[f"{name}_px"] = value
             found[f"{name}_um"] = None if self.pixel_size_um is None else value * self.pixel_size_um
         found["doubts"] = "; ".join(net.doubts)
+        found["file"] = self.file
         return found
 
     def rows(self) -> list[dict[str, Value]]:
@@ -125,6 +148,7 @@ class Measurement:
             if self.spatial:
                 row |= _spatial_columns(self.spatial[number - 1])
             row["doubts"] = "; ".join(fibre.doubts)
+            row["file"] = self.file
             found.append(row)
         return found
 
@@ -133,15 +157,16 @@ def _spatial_columns(found: SpatialFibre | str) -> dict[str, Value]:
     """Return what a focal stack says of a fibre, or empty columns with the reason."""
     known = found if isinstance(found, SpatialFibre) else None
     heights = None if known is None else known.line_um[:, 2]
-    return {
-        "spatial_length_um": None if known is None else known.length_um,
-        "spatial_length_std_um": None if known is None else known.length_std_um,
-        "tilt_deg": None if known is None else known.tilt_deg,
-        "tilt_std_deg": None if known is None else known.tilt_std_deg,
-        "lowest_um": None if heights is None else float(heights.min()),
-        "highest_um": None if heights is None else float(heights.max()),
-        "spatial_doubt": found if isinstance(found, str) else "",
-    }
+    values: tuple[Value, ...] = (
+        None if known is None else known.length_um,
+        None if known is None else known.length_std_um,
+        None if known is None else known.tilt_deg,
+        None if known is None else known.tilt_std_deg,
+        None if heights is None else float(heights.min()),
+        None if heights is None else float(heights.max()),
+        found if isinstance(found, str) else "",
+    )
+    return dict(zip(SPATIAL, values, strict=True))
 
 
 def measure(
@@ -154,30 +179,36 @@ def measure(
     image : ndarray, shape (height, width) or (height, width, 3), or a file
         As `find_fibres` takes it, or a TIFF, OME-TIFF, PNG or JPEG with a single page.
     pixel_size_um : float, optional
-        Side of a pixel; otherwise what the file says.
+        Side of a pixel, from 0.0001 to 10,000; otherwise what the file says.
 
     Raises
     ------
     ConfigError
-        The image or the pixel size is none.
+        The image or the pixel size is none, or the file has several pages.
     NotAvailable
         Fibres cannot be looked for on this image.
     RecordingError
-        The file cannot be read, or has several pages.
+        The file cannot be read.
+    TypeError
+        The pixel size is no number.
     """
     if isinstance(image, Path | str):
         pages = list(read_images(Path(image)))
         if len(pages) != 1:
             raise ConfigError(f"{image} has {len(pages)} pages; measure them one by one")
-        return measure_page(pages[0], pixel_size_um)
+        return replace(measure_page(pages[0], pixel_size_um), file=str(image))
     return measure_page(FileImage("", image, None, NOT_KNOWN), pixel_size_um)
 
 
 def measure_page(page: FileImage, pixel_size_um: float | None = None) -> Measurement:
     """Measure one page of a file that `read_images` read; raises as `measure`."""
-    if pixel_size_um is not None and not 0.0 < pixel_size_um < np.inf:
-        raise ConfigError(f"a pixel size is above 0 µm and finite, not {pixel_size_um} µm")
-    fibres = tuple(find_fibres(page.pixels))
+    check_pixel_size(pixel_size_um)
+    try:
+        fibres = tuple(find_fibres(page.pixels))
+    except MemoryError as exc:
+        raise NotAvailable(
+            f"there is not enough memory for an image of shape {page.pixels.shape}; cut it"
+        ) from exc
     size, source = page.pixel_size_um, page.pixel_size_from
     if pixel_size_um is not None:
         size, source = pixel_size_um, "given"
@@ -186,6 +217,27 @@ def measure_page(page: FileImage, pixel_size_um: float | None = None) -> Measure
     return Measurement(
         page.name, fibres, (rows, columns), size, source, _network(page) if dense else None
     )
+
+
+def check_pixel_size(pixel_size_um: object) -> None:
+    """Refuse what is given as a pixel size and is none; None is that none is given.
+
+    Raises
+    ------
+    ConfigError
+        It is beyond what any microscope has.
+    TypeError
+        It is no number.
+    """
+    if pixel_size_um is None:
+        return
+    if isinstance(pixel_size_um, bool) or not isinstance(pixel_size_um, Real):
+        said = f"{pixel_size_um!r:.60} ({type(pixel_size_um).__name__})"
+        raise TypeError(f"pixel_size_um must be a number, not {said}")
+    if not SMALLEST_UM <= float(pixel_size_um) <= LARGEST_UM:
+        raise ConfigError(
+            f"a pixel size is from {SMALLEST_UM:g} to {LARGEST_UM:g} µm, not {pixel_size_um} µm"
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -230,21 +282,22 @@ def measure_stack(
     Raises
     ------
     ConfigError
-        Heights or pixel size are not known or none, or there are fewer than four images.
+        Heights or pixel size are not known or none, there are fewer than four images, or they
+        differ in more than their height: in channel, moment or pixel size.
     NotAvailable
         Fibres cannot be looked for on them.
     """
     files = [each if isinstance(each, FileImage) else _from_array(each) for each in pages]
+    check_pixel_size(pixel_size_um)
+    if not lens_distance_um > 0:
+        raise ConfigError(f"the lens is above 0 µm away from the focus, not {lens_distance_um} µm")
     if not files or (pixel_size_um is None and files[0].pixel_size_um is None):
-        raise ConfigError("a fibre in space needs images and a pixel size; give one")
+        said = f" (it is {files[0].pixel_size_from})" if files else ""
+        raise ConfigError(f"a fibre in space needs images and a pixel size; give one{said}")
+    if pixel_size_um is None and len({each.pixel_size_um for each in files}) > 1:
+        raise ConfigError("focal stack: the images have different pixel sizes; give one")
     if heights_um is None:
-        step = step_um if step_um is not None else next((each.step_um for each in files), None)
-        if step is None or not 0.0 < step < np.inf:
-            raise ConfigError(
-                f"the heights of the focus are not known (step {step} µm); the file says nothing "
-                "of them: give the step"
-            )
-        heights_um = [step * number for number in range(len(files))]
+        heights_um = _heights_um(files, step_um)
     stack = FocalStack.of([each.pixels for each in files], heights_um)
     heights = height_map(stack)
     sharp = sharp_image(stack, heights)
@@ -252,6 +305,23 @@ def measure_stack(
     view = View(flat.pixel_size_um or np.nan, distance_um=lens_distance_um)
     spatial = tuple(_in_space(stack, fibre, view) for fibre in flat.fibres)
     return MeasuredStack(replace(flat, spatial=spatial), sharp, heights)
+
+
+def _heights_um(files: Sequence[FileImage], step_um: float | None) -> list[float]:
+    """Return the heights of images that follow one another in height alone."""
+    besides = files[0].besides_height
+    if besides:
+        raise ConfigError(
+            f"focal stack: the file has {besides}, so its pages are not heights alone; save one "
+            "of them as a stack of heights (in ImageJ: Image > Duplicate)"
+        )
+    step = step_um if step_um is not None else next((each.step_um for each in files), None)
+    if step is None or not 0.0 < step < np.inf:
+        raise ConfigError(
+            f"the heights of the focus are not known (step {step} µm); the file says nothing "
+            "of them: give the step"
+        )
+    return [step * number for number in range(len(files))]
 
 
 def _from_array(pixels: npt.NDArray[np.generic]) -> FileImage:
