@@ -83,9 +83,11 @@ def run(chosen: argparse.Namespace) -> int:
     try:
         interrupted = _interrupted(files, folder, chosen, results)
     finally:  # what was measured is kept whatever ends the run
-        _write_tables(folder, results, spatial=chosen.focal_stack)
+        if results.measured:  # else they would be in the way of the next run
+            _write_tables(folder, results, spatial=chosen.focal_stack)
     text = summary(results.measured, len(results.refused), len(results.pages_refused))
-    sys.stdout.write(encoded(f"{text}{folder}\n").decode())
+    where = f"{folder}\n" if results.measured else ""
+    sys.stdout.write(encoded(f"{text}{where}").decode())
     if interrupted:
         return INTERRUPTED
     return 1 if results.refused or results.pages_refused else 0

@@ -297,3 +297,9 @@ def test_pages_that_differ_in_more_than_height_are_no_focal_stack(
     written(tmp_path / "a.tif")
     with pytest.raises(ConfigError, match=said):
         measure_stack(list(read_images(tmp_path / "a.tif")))
+
+
+def test_a_run_that_measured_nothing_is_not_in_the_way_of_the_next(image: Path, out: Path) -> None:
+    assert main(["measure", str(image.with_name("nosuch.png")), "--output", str(out)]) == 1
+    assert main(["measure", str(image), "--output", str(out)]) == 0
+    assert len(rows_of(out / "fibres.csv")) == 1

@@ -87,7 +87,7 @@ def pixel_size(
     of_print : bool
         It may be the size of a print: 25 µm and more are none of a pixel.
     quiet : bool
-        As `of_print`, and give no reason where it is the size of a print, which nearly every file states.
+        As `of_print`, and give no reason then: nearly every file states the size of a print.
     """
     y_um = x_um if y_um is None else y_um
     if not (0 < x_um < inf and 0 < y_um < inf):
