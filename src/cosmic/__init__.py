@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         RecordingError,
         StoppedError,
         UnknownAxisError,
+        UnknownToolError,
     )
     from cosmic.frame.operation import Progress, Task
     from cosmic.frame.verdict import MoveVerdict, Reason
@@ -60,6 +61,7 @@ _HOMES = {
         "RecordingError",
         "StoppedError",
         "UnknownAxisError",
+        "UnknownToolError",
     ),
     "cosmic.frame.operation": ("Progress", "Task"),
     "cosmic.frame.verdict": ("MoveVerdict", "Reason"),
@@ -98,6 +100,7 @@ __all__ = [
     "StoppedError",
     "Task",
     "UnknownAxisError",
+    "UnknownToolError",
     "connect",
     "measure",
     "open_recording",

@@ -45,6 +45,18 @@ class UnknownAxisError(CosmicError, KeyError):
         return self.text
 
 
+class UnknownToolError(CosmicError, KeyError):
+    """No tool of that name; the text lists those there are."""
+
+    def __init__(self, name: object, known: Iterable[str]) -> None:
+        self.text = f"there is no tool {name!r}; known tools: {', '.join(known) or 'none'}"
+        super().__init__(self.text)
+
+    @override
+    def __str__(self) -> str:
+        return self.text
+
+
 class WrongThreadError(CosmicError):
     """A blocking call was made in the GUI thread, which must never wait."""
 

@@ -163,6 +163,31 @@ def test_the_scene_names_the_tools_and_knows_where_they_are(rig):
     assert right.position() == pytest.approx(expected, abs=0.01)
 
 
+def test_an_unknown_tool_axis_or_position_is_named(rig):
+    with pytest.raises(cosmic.UnknownToolError, match="'foo'; known tools: left"):
+        rig.mico.tools["foo"]
+    assert rig.mico.tools.get("foo") is None
+    with pytest.raises(cosmic.UnknownAxisError, match="'foo'"):
+        rig.mico.nearest({"foo": 0.0})
+    for value in ("5 um", math.nan):
+        with pytest.raises(cosmic.ConfigError, match=r"left\.x: a position is a finite number"):
+            rig.mico.nearest({"left.x": value})
+
+
+def test_a_jog_that_is_too_fast_is_told_how_fast_it_may_be(rig):
+    with pytest.raises(cosmic.MoveRefused, match="above 0 and up to 18500 um/s, not 20000"):
+        rig.mico["left.x"].jog(1, speed=20000.0)
+
+
+def test_a_pose_that_was_read_does_not_change_the_one_kept(rig):
+    taught = rig.mico.poses.teach("kept", ["left.x"])
+    where = dict(taught.positions)
+    taught.positions["left.x"] = 1234.0
+    rig.mico.poses["kept"].positions["left.x"] = 1234.0
+    assert rig.mico.poses["kept"].positions == where
+    rig.mico.poses.remove("kept")
+
+
 def test_a_tool_that_looks_the_other_way_moves_forward_in_its_own_frame(rig):
     right = rig.mico.tools["right"]
     before = right.position()

@@ -541,7 +541,11 @@ class Axis(PlanMovable, Declared):
         usual = {"um": jog.speed_um_s, "deg": jog.speed_deg_s, "Hz": float(jog.frequency_hz)}
         wanted = usual[unit] if speed is None else as_number(speed, unit, self._name)
         if direction not in (1, -1) or not 0.0 < wanted <= state.frequency_range_hz[1]:
-            text = f"{self._name}: jog in direction 1 or -1 with a speed above 0"
+            fastest = f"{state.frequency_range_hz[1]:g} {unit if by_steps else f'{unit}/s'}"
+            text = (
+                f"{self._name}: jog in direction 1 or -1 with a speed above 0 and up to {fastest}, "
+                f"not {wanted:g} in direction {direction}"
+            )
             raise refusal(refuse(Reason.NOT_FINITE, text, axis=self._name))
         return self._jogging(Jog(direction, wanted), consent=consent)
 

@@ -2,6 +2,8 @@
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from math import isfinite
+from numbers import Real
 from threading import Lock
 from typing import Final, Literal, Protocol, overload, runtime_checkable
 
@@ -13,6 +15,7 @@ from cosmic.frame.arguments import checked_class
 from cosmic.frame.clock import Clock
 from cosmic.frame.declaration import Companion, Declared, command, part, state, stream
 from cosmic.frame.errors import (
+    ConfigError,
     CosmicError,
     MoveCancelled,
     MoveRefused,
@@ -986,7 +989,22 @@ class Mico(Declared):
 
     @command(reads=True)
     def nearest(self, positions: dict[str, float]) -> Approach | None:
-        """Return the nearest pair of bodies with the axes at `positions`."""
+        """Return the nearest pair of bodies with the axes at `positions`, as the gate counts.
+
+        Raises
+        ------
+        UnknownAxisError
+            There is no such axis.
+        ConfigError
+            A position is no finite number.
+        NoAnswerError
+            The gate does not answer.
+        """
+        for name, value in positions.items():
+            if name not in self:
+                raise UnknownAxisError(name, self.names)
+            if not isinstance(value, Real) or not isfinite(value):
+                raise ConfigError(f"{name}: a position is a finite number, not {value!r}")
         return self._model.nearest(positions)
 
     @command(reads=True, timeout_s=SCENE_LIMIT_S)

@@ -9,7 +9,7 @@ import numpy as np
 from typing_extensions import override
 
 from cosmic.frame.arguments import checked_class
-from cosmic.frame.errors import NotAvailable, refusal
+from cosmic.frame.errors import NotAvailable, UnknownToolError, refusal
 from cosmic.frame.operation import wait_or_cancel
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.api.group import GroupMovement
@@ -221,9 +221,9 @@ class Tools(Mapping[str, Tool]):
 
     @override
     def __getitem__(self, name: str) -> Tool:
-        model = self._axes.scene_model
-        if name not in [each.name for each in model.tools]:
-            raise KeyError(f"{name!r} is no tool; there are: {', '.join(self) or 'none'}")
+        """Return a tool; raises `UnknownToolError`, a `CosmicError` and `KeyError`."""
+        if name not in list(self):
+            raise UnknownToolError(name, self)
         return Tool(self._axes, name, self._source)
 
     @override

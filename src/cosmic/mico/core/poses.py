@@ -5,7 +5,7 @@ import math
 import re
 import reprlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import RLock
 from typing import Final
@@ -75,7 +75,7 @@ class PoseBook:
     def poses(self) -> dict[str, Pose]:
         """All poses by name, in the order of the file."""
         with self._guard:
-            return dict(self._poses)
+            return {name: _copied(pose) for name, pose in self._poses.items()}
 
     def __getitem__(self, name: str) -> Pose:
         return pose_named(name, self.poses)
@@ -94,7 +94,7 @@ class PoseBook:
         if not pose.positions:
             raise NotAvailable(f"the pose {pose.name!r} has no axis to go to")
         with self._guard:
-            self._poses[pose.name] = pose
+            self._poses[pose.name] = _copied(pose)
             self._write(pose.name)
 
     def remove(self, name: str) -> None:
@@ -115,6 +115,11 @@ class PoseBook:
         except (OSError, UnicodeDecodeError) as exc:
             self._path = None
             logger.warning("%s cannot be written (%s): poses are kept in memory only", path, exc)
+
+
+def _copied(pose: Pose) -> Pose:
+    """Return a pose that changes with no other."""
+    return replace(pose, positions=dict(pose.positions))
 
 
 def read_poses(path: Path) -> dict[str, Pose]:
