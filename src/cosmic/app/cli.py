@@ -2,9 +2,11 @@
 
 import argparse
 import logging
+import math
+import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from datetime import datetime
 from importlib import import_module
@@ -13,7 +15,10 @@ from typing import Final
 
 from cosmic import __version__
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.interruption import Interrupted, interruptible
 from cosmic.frame.log import set_up_logging
+
+logger = logging.getLogger(__name__)
 
 _WINDOWS: Final = (None, "mico", "daqco", "vico")
 _LOG_THEMSELVES: Final = (*_WINDOWS, "serve")
@@ -33,11 +38,16 @@ DEVICE_KINDS: Final = (
     "contact",
 )
 """What `cosmic new-device` writes packages for."""
+_MOST: Final = 1000
+"""Of what is counted: a slip of the key does not measure for days."""
 _CONFIG: Final = "a platform.toml or its folder"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Carry out one command and return the exit code: 0 success, 1 failure, 2 not understood."""
+    """Carry out one command and return the exit code: 0 success, 1 failure, 2 not understood.
+
+    After a signal that ended it, it is 128 and the number of that: 130 for Ctrl+C.
+    """
     parser = _parser()
     chosen, unknown = parser.parse_known_args(arguments)
     if unknown:
@@ -51,12 +61,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             # Loaded when called: most commands need no widgets, and none needs all the rest.
             file = "window" if opens_window else chosen.command.replace("-", "_")
-            carried_out: int = import_module(f"cosmic.app.commands.{file}").run(chosen)
+            with interruptible():
+                carried_out: int = import_module(f"cosmic.app.commands.{file}").run(chosen)
         except CosmicError as exc:
             for line in str(exc).splitlines():
                 sys.stderr.write(f"cosmic: {line}\n")
             return 1
+        except Interrupted as exc:
+            sys.stderr.write(f"cosmic: {exc}\n")
+            return exc.exit_code
+        except BrokenPipeError:
+            # Whoever read has gone, as `head` does: what is left would fail once more at the end.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 1
+        except OSError as exc:
+            logger.debug("%s failed", chosen.command, exc_info=True)
+            sys.stderr.write(f"cosmic: {_os_words(exc)}\n")
+            return 1
         return carried_out
+
+
+def _os_words(error: OSError) -> str:
+    """Return what the system says, with the path that it is about."""
+    where = "" if error.filename is None else f"{os.fsdecode(error.filename)}: "
+    return f"{where}{error.strerror or error}"
 
 
 def _parser() -> argparse.ArgumentParser:

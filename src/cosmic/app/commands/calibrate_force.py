@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final, TextIO
 
-from cosmic.app.commands.chosen_rig import chosen_rig
+from cosmic.app.commands.chosen_rig import carry_out, chosen_rig
 from cosmic.app.rig import Rig
 from cosmic.autonomy.bending.fit import assess_campaign, in_time, measure_fibre
 from cosmic.autonomy.bending.standards import ForceScale
@@ -185,7 +185,7 @@ def bent(rig: Rig, settings: HandlingSettings, times: int) -> ForceScale:
     try:
         with armed_beyond_parking(work):
             for _ in range(times):
-                rig.procedure(build_standard(settings), work).run_here()
+                carry_out(rig.procedure(build_standard(settings), work))
     finally:
         work.close()
     fit = settings.push.fit.model_copy(update={"fibre_width_um": settings.standard.width_um})
