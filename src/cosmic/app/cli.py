@@ -247,8 +247,8 @@ def _add_analysis_commands(
     trial.add_argument(
         "--world", choices=("friendly", "realistic", "harsh"), default="realistic", help="of which"
     )
-    trial.add_argument("--fibres", type=int, default=16, help="fibres of a session")
-    trial.add_argument("--sessions", type=int, default=1, help="sessions, each drawn anew")
+    trial.add_argument("--fibres", type=_count, default=16, help="fibres of a session")
+    trial.add_argument("--sessions", type=_count, default=1, help="sessions, each drawn anew")
     trial.add_argument(
         "--sealed-by", type=Path, metavar="FILE.py", help="program of sealed sessions of your own"
     )
@@ -270,13 +270,21 @@ def _add_analysis_commands(
         "sample-size", help="how many good fibres make the mean as precise as wanted"
     )
     size.add_argument("folder", type=Path, nargs="?", metavar="FOLDER", help="spread of a campaign")
-    size.add_argument("--spread", type=float, metavar="SD", help="sd of ln(EI) between fibres")
     size.add_argument(
-        "--shared-percent", type=float, metavar="P", help="half of the 95 %% interval all share"
+        "--spread",
+        type=_number("standard deviation of ln(EI) above 0 and below 10", above=0.0, below=10.0),
+        metavar="SD",
+        help="sd of ln(EI) between fibres",
+    )
+    size.add_argument(
+        "--shared-percent",
+        type=_number("half width from 0 to below 1000 %", least=0.0, below=1000.0),
+        metavar="P",
+        help="half of the 95 %% interval all share",
     )
     size.add_argument(
         "--precision",
-        type=lambda text: (float(text),),
+        type=_number("half width above 0 and below 1000 %", above=0.0, below=1000.0),
         metavar="P",
         help="half of the wanted 95 %% interval, in per cent",
     )
@@ -313,7 +321,12 @@ def _add_simulate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]
     scu.add_argument("--seed", type=int, default=0, help="seed of the simulation")
     scu.add_argument("--baud", type=int, default=9600, help="speed of the line")
     scu.add_argument("--cold", action="store_true", help="just switched on: nothing is referenced")
-    scu.add_argument("--seconds", type=float, default=None, help="end after so long")
+    scu.add_argument(
+        "--seconds",
+        type=_number("number of seconds", least=0.0),
+        default=None,
+        help="end after so long",
+    )
     library = kinds.add_parser(
         "library", help="a shared library in the place of a vendor's, for programs in any language"
     )
@@ -401,18 +414,24 @@ def _add_calibrate_force(
         help="the scale of the force, against known weights or a reference beam on the plate",
         parents=[platform, _connect_options()],
     )
-    force.add_argument(
+    against = force.add_mutually_exclusive_group(required=True)
+    against.add_argument(
         "--weights", type=_masses, metavar="MG", help="masses in milligrams, such as 1,2,5"
     )
-    force.add_argument("--beam", type=float, metavar="EI", help="bending stiffness of a beam, N m2")
+    against.add_argument(
+        "--beam",
+        type=_number("bending stiffness above 0 in N m2, such as 6e-11", above=0.0),
+        metavar="EI",
+        help="bending stiffness of a beam, N m2",
+    )
     force.add_argument(
         "--expanded-percent",
-        type=float,
+        type=_number("uncertainty from 0 to below 50 %", least=0.0, below=50.0),
         default=2.0,
         metavar="P",
         help="expanded uncertainty of the masses or of the beam, k = 2",
     )
-    force.add_argument("--rounds", type=int, default=None, help="how often all is measured")
+    force.add_argument("--rounds", type=_count, default=None, help="how often all is measured")
     force.add_argument("--channel", default="force", help="of the weights")
     force.add_argument("--out", type=Path, metavar="FILE", help="write all readings there, as JSON")
 
@@ -483,9 +502,39 @@ def _names(text: str) -> tuple[str, ...]:
 
 def _masses(text: str) -> tuple[float, ...]:
     try:
-        return tuple(float(each) for each in text.split(","))
+        masses = tuple(float(each) for each in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} are no masses such as 1,2,5") from None
+        masses = ()
+    if not masses or not all(0.0 < each < math.inf for each in masses):
+        raise argparse.ArgumentTypeError(f"{text!r} are no masses above 0 such as 1,2,5")
+    return masses
+
+
+def _count(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if not 1 <= value <= _MOST:
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 1 to {_MOST}")
+    return value
+
+
+def _number(
+    what: str, *, least: float = -math.inf, above: float = -math.inf, below: float = math.inf
+) -> Callable[[str], float]:
+    """Return what reads a finite number between bounds, and else says that it is no `what`."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not (least <= value < below and above < value):
+            raise argparse.ArgumentTypeError(f"{text!r} is no {what}")
+        return value
+
+    return read
 
 
 def _moment(text: str) -> datetime:

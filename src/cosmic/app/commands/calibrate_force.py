@@ -50,13 +50,16 @@ def run(chosen: argparse.Namespace) -> int:
     CosmicError
         There is no such channel, a load is none, or the readings cannot be used.
     """
-    with chosen_rig(chosen) as rig:
-        if chosen.beam is not None:
+    if chosen.beam is not None:
+        if chosen.out is not None:
+            raise ConfigError(f"--out {chosen.out}: only readings of --weights are written")
+        with chosen_rig(chosen) as rig:
             return by_beam(rig, chosen.beam, chosen.expanded_percent, chosen.rounds or BENDS)
-        if chosen.weights is None:
-            raise ConfigError("name --weights in milligrams, or the --beam on the plate")
-        loads = [weight(each, chosen.expanded_percent) for each in chosen.weights]
-        calibration = ForceCalibration(loads, chosen.rounds or ROUNDS)
+    loads = [weight(each, chosen.expanded_percent) for each in chosen.weights]
+    calibration = ForceCalibration(loads, chosen.rounds or ROUNDS)
+    if chosen.out is not None and (chosen.out.is_dir() or not chosen.out.parent.is_dir()):
+        raise ConfigError(f"--out {chosen.out}: name a file in a folder that there is")
+    with chosen_rig(chosen) as rig:
         before = rig.daqco.scales[checked_channel(rig.daqco, chosen.channel)]
         found = lead(calibration, rig.daqco, chosen.channel, _ask(sys.stdin, sys.stdout))
         if found is None:
