@@ -382,6 +382,41 @@ def test_what_cannot_be_done_is_refused_before_it_begins(
     assert not (tmp_path / "x").exists()
 
 
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        (["export", "."], ".: is a directory"),
+        (["export", "/"], "/: is a directory"),
+        (["session", "pack", "afile", "--output", "afile/a.zip"], "afile is no folder"),
+        (["new-device", "camera", "cam", "--out", "afile"], "cannot be written (Not a directory)"),
+        (["audit", "bytes.toml"], "bytes.toml: is no audit trail"),
+        (["audit", "afile"], "afile: is no audit trail"),
+    ],
+)
+def test_a_path_that_cannot_be_used_is_named_in_a_line(
+    arguments: list[str],
+    wanted: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "afile").write_text("some text\n", encoding="utf-8")
+    (tmp_path / "bytes.toml").write_bytes(b"\xff\xfe\x00name\n")
+    assert main(arguments) == 1
+    (said,) = complaints(capsys)
+    assert wanted in said
+
+
+def test_a_calibration_that_is_not_there_is_answered_with_those_that_are(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["calibrate", "--anew", "nosuch"]) == 1
+    said = complaints(capsys)[-1]
+    assert "there is no calibration 'nosuch'; there are: " in said
+    assert "rotation centre" in said
+
+
 def test_what_all_fibres_share_is_printed_as_it_was_given(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
