@@ -178,7 +178,7 @@ def test_an_export_never_replaces_the_recording_that_it_reads(recorded, monkeypa
     monkeypatch.chdir(path.parent)
     for to in ("csv", "tdms"):
         for out in (path, "run.h5", "./run.h5", "../" + path.parent.name + "/run.h5", linked, hard):
-            with pytest.raises(RecordingError):
+            with pytest.raises(RecordingError, match="is the recording itself"):
                 export_file("run.h5", to, out, overwrite=True)
     for export_to in (export_csv, export_tdms):
         with (

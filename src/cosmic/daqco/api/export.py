@@ -90,9 +90,9 @@ def export_file(
     if source.is_dir():
         raise RecordingError(f"{source}: is a directory; name a recording in it")
     target = source.with_suffix(f".{to}") if out_path is None else Path(out_path)
-    _check_suffix(target, to)
     with open_recording(source) as recording:
         _check_other(recording, target)  # whatever a format of others looks at
+        _check_suffix(target, to)
         return export(recording, target, progress, overwrite=overwrite)
 
 
