@@ -31,6 +31,7 @@ from cosmic.autonomy.bending.result import BendingError, BendingResult, Floats
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.platform_services import own_session
 
 WORLDS: Final = ("friendly", "realistic", "harsh")
 STANDARD: Final = -1
@@ -146,19 +147,24 @@ class SealedSession:
     def __init__(
         self, program: Path, world: str, fibres: int, *, secret: int | None = None
     ) -> None:
+        if not program.is_file():
+            raise TrialError(f"{program}: there is no such program of sealed sessions")
+        # What interrupts the trial ends the session from here, and not with words of its own.
+        self._program = program
         self._process = subprocess.Popen(
             [sys.executable, "-P", str(program)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
             encoding="utf-8",
+            **own_session(),
         )
         asked: dict[str, Any] = {"world": world, "fibres": fibres}
         if secret is not None:
             asked["seed"] = secret
         try:
             head = self._ask(asked)
-        except TrialError:
+        except BaseException:
             self.close()
             raise
         self.seal = str(head["seal"])
@@ -218,9 +224,21 @@ class SealedSession:
         try:
             given.write(json.dumps(request) + "\n")
             given.flush()
-            return dict(json.loads(taken.readline()))
+            line = taken.readline()
         except (OSError, ValueError) as exc:
-            raise TrialError(f"the sealed session does not answer: {exc}") from exc
+            raise TrialError(f"{self._program}: the sealed session has ended: {exc}") from exc
+        if not line:
+            raise TrialError(
+                f"{self._program}: the sealed session does not answer, it has ended; see what it "
+                "printed above"
+            )
+        try:
+            return dict(json.loads(line))
+        except (TypeError, ValueError) as exc:
+            raise TrialError(
+                f"{self._program}: the sealed session does not answer with a line of JSON, "
+                f"but with {line.strip()[:80]!r}"
+            ) from exc
 
 
 def _gentle_um(line_um: Floats) -> float:

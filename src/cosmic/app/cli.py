@@ -2,9 +2,11 @@
 
 import argparse
 import logging
+import math
+import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from datetime import datetime
 from importlib import import_module
@@ -13,7 +15,10 @@ from typing import Final
 
 from cosmic import __version__
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.interruption import Interrupted, interruptible
 from cosmic.frame.log import set_up_logging
+
+logger = logging.getLogger(__name__)
 
 _WINDOWS: Final = (None, "mico", "daqco", "vico")
 _LOG_THEMSELVES: Final = (*_WINDOWS, "serve")
@@ -33,11 +38,16 @@ DEVICE_KINDS: Final = (
     "contact",
 )
 """What `cosmic new-device` writes packages for."""
+_MOST: Final = 1000
+"""Of what is counted: a slip of the key does not measure for days."""
 _CONFIG: Final = "a platform.toml or its folder"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Carry out one command and return the exit code: 0 success, 1 failure, 2 not understood."""
+    """Carry out one command and return the exit code: 0 success, 1 failure, 2 not understood.
+
+    After a signal that ended it, it is 128 and the number of that: 130 for Ctrl+C.
+    """
     parser = _parser()
     chosen, unknown = parser.parse_known_args(arguments)
     if unknown:
@@ -51,12 +61,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             # Loaded when called: most commands need no widgets, and none needs all the rest.
             file = "window" if opens_window else chosen.command.replace("-", "_")
-            carried_out: int = import_module(f"cosmic.app.commands.{file}").run(chosen)
+            with interruptible():
+                carried_out: int = import_module(f"cosmic.app.commands.{file}").run(chosen)
         except CosmicError as exc:
             for line in str(exc).splitlines():
                 sys.stderr.write(f"cosmic: {line}\n")
             return 1
+        except Interrupted as exc:
+            sys.stderr.write(f"cosmic: {exc}\n")
+            return exc.exit_code
+        except BrokenPipeError:
+            # Whoever read has gone, as `head` does: what is left would fail once more at the end.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 1
+        except OSError as exc:
+            logger.debug("%s failed", chosen.command, exc_info=True)
+            sys.stderr.write(f"cosmic: {_os_words(exc)}\n")
+            return 1
         return carried_out
+
+
+def _os_words(error: OSError) -> str:
+    """Return what the system says, with the path that it is about."""
+    where = "" if error.filename is None else f"{os.fsdecode(error.filename)}: "
+    return f"{where}{error.strerror or error}"
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -226,8 +254,8 @@ def _add_analysis_commands(
     trial.add_argument(
         "--world", choices=("friendly", "realistic", "harsh"), default="realistic", help="of which"
     )
-    trial.add_argument("--fibres", type=int, default=16, help="fibres of a session")
-    trial.add_argument("--sessions", type=int, default=1, help="sessions, each drawn anew")
+    trial.add_argument("--fibres", type=_count, default=16, help="fibres of a session")
+    trial.add_argument("--sessions", type=_count, default=1, help="sessions, each drawn anew")
     trial.add_argument(
         "--sealed-by", type=Path, metavar="FILE.py", help="program of sealed sessions of your own"
     )
@@ -249,13 +277,21 @@ def _add_analysis_commands(
         "sample-size", help="how many good fibres make the mean as precise as wanted"
     )
     size.add_argument("folder", type=Path, nargs="?", metavar="FOLDER", help="spread of a campaign")
-    size.add_argument("--spread", type=float, metavar="SD", help="sd of ln(EI) between fibres")
     size.add_argument(
-        "--shared-percent", type=float, metavar="P", help="half of the 95 %% interval all share"
+        "--spread",
+        type=_number("standard deviation of ln(EI) above 0 and below 10", above=0.0, below=10.0),
+        metavar="SD",
+        help="sd of ln(EI) between fibres",
+    )
+    size.add_argument(
+        "--shared-percent",
+        type=_number("half width from 0 to below 1000 %", least=0.0, below=1000.0),
+        metavar="P",
+        help="half of the 95 %% interval all share",
     )
     size.add_argument(
         "--precision",
-        type=lambda text: (float(text),),
+        type=_number("half width above 0 and below 1000 %", above=0.0, below=1000.0),
         metavar="P",
         help="half of the wanted 95 %% interval, in per cent",
     )
@@ -292,7 +328,12 @@ def _add_simulate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]
     scu.add_argument("--seed", type=int, default=0, help="seed of the simulation")
     scu.add_argument("--baud", type=int, default=9600, help="speed of the line")
     scu.add_argument("--cold", action="store_true", help="just switched on: nothing is referenced")
-    scu.add_argument("--seconds", type=float, default=None, help="end after so long")
+    scu.add_argument(
+        "--seconds",
+        type=_number("number of seconds", least=0.0),
+        default=None,
+        help="end after so long",
+    )
     library = kinds.add_parser(
         "library", help="a shared library in the place of a vendor's, for programs in any language"
     )
@@ -380,18 +421,24 @@ def _add_calibrate_force(
         help="the scale of the force, against known weights or a reference beam on the plate",
         parents=[platform, _connect_options()],
     )
-    force.add_argument(
+    against = force.add_mutually_exclusive_group(required=True)
+    against.add_argument(
         "--weights", type=_masses, metavar="MG", help="masses in milligrams, such as 1,2,5"
     )
-    force.add_argument("--beam", type=float, metavar="EI", help="bending stiffness of a beam, N m2")
+    against.add_argument(
+        "--beam",
+        type=_number("bending stiffness above 0 in N m2, such as 6e-11", above=0.0),
+        metavar="EI",
+        help="bending stiffness of a beam, N m2",
+    )
     force.add_argument(
         "--expanded-percent",
-        type=float,
+        type=_number("uncertainty from 0 to below 50 %", least=0.0, below=50.0),
         default=2.0,
         metavar="P",
         help="expanded uncertainty of the masses or of the beam, k = 2",
     )
-    force.add_argument("--rounds", type=int, default=None, help="how often all is measured")
+    force.add_argument("--rounds", type=_count, default=None, help="how often all is measured")
     force.add_argument("--channel", default="force", help="of the weights")
     force.add_argument("--out", type=Path, metavar="FILE", help="write all readings there, as JSON")
 
@@ -462,9 +509,39 @@ def _names(text: str) -> tuple[str, ...]:
 
 def _masses(text: str) -> tuple[float, ...]:
     try:
-        return tuple(float(each) for each in text.split(","))
+        masses = tuple(float(each) for each in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} are no masses such as 1,2,5") from None
+        masses = ()
+    if not masses or not all(0.0 < each < math.inf for each in masses):
+        raise argparse.ArgumentTypeError(f"{text!r} are no masses above 0 such as 1,2,5")
+    return masses
+
+
+def _count(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if not 1 <= value <= _MOST:
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 1 to {_MOST}")
+    return value
+
+
+def _number(
+    what: str, *, least: float = -math.inf, above: float = -math.inf, below: float = math.inf
+) -> Callable[[str], float]:
+    """Return what reads a finite number between bounds, and else says that it is no `what`."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not (least <= value < below and above < value):
+            raise argparse.ArgumentTypeError(f"{text!r} is no {what}")
+        return value
+
+    return read
 
 
 def _moment(text: str) -> datetime:

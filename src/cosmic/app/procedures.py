@@ -17,7 +17,7 @@ from cosmic.autonomy.handling.context import Applications, HandlingContext
 from cosmic.autonomy.handling.plate_change import PlateHandler
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.procedure import Procedure
-from cosmic.autonomy.shipped.calibrate import build_calibrate
+from cosmic.autonomy.shipped.calibrate import build_calibrate, calibration_names
 from cosmic.frame.arguments import check_path, checked
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.version import __version__
@@ -76,10 +76,10 @@ def calibration_on(
 ) -> tuple[Procedure[HandlingContext], HandlingContext]:
     """Return a procedure that calibrates, and its context, to be closed; see `Rig.calibrate`."""
     settings, registry = settings or HandlingSettings(), registry_of(rig)
-    known = {each.name for each in registry.entries}
+    known = {each.name for each in registry.entries} | calibration_names()
     if unknown := [each for each in anew if each not in known]:
-        listed = ", ".join(sorted(known)) or "none"
-        raise ConfigError(f"there is no calibration {unknown[0]!r}; known are: {listed}")
+        listed = ", ".join(sorted(known))
+        raise ConfigError(f"there is no calibration {unknown[0]!r}; there are: {listed}")
     for entry in registry.entries:
         if entry.name in anew:
             registry.forget(*entry.key)

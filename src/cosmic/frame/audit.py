@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from typing_extensions import override
 
-from cosmic.frame.errors import CosmicError, MoveRefused
+from cosmic.frame.errors import ConfigError, CosmicError, MoveRefused
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import WorkerThread
 
@@ -124,12 +124,32 @@ def _line(entry: AuditEntry) -> str:
 
 
 def read_entries(path: Path) -> Iterator[dict[str, Any]]:
-    """Yield what stands in a trail, oldest first; a line that was cut off is left out."""
-    with path.open(encoding="utf-8") as file:
-        for line in file:
-            try:
-                found = json.loads(line)
-            except ValueError:
-                continue
-            if isinstance(found, dict):
-                yield found
+    """Yield what stands in a trail, oldest first; a line that was cut off is left out.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read, or has lines and none of them is an entry.
+    """
+    lines = entries = 0
+    try:
+        # A byte that is no text is in a line that was cut off, or in no trail at all.
+        with path.open(encoding="utf-8", errors="replace") as file:
+            for line in file:
+                lines += 1
+                found = _entry(line)
+                if found is not None:
+                    entries += 1
+                    yield found
+    except OSError as exc:
+        raise ConfigError(f"{path}: cannot be read ({exc.strerror or exc})") from exc
+    if lines and not entries:
+        raise ConfigError(f"{path}: is no audit trail: no line of it is an entry, written as JSON")
+
+
+def _entry(line: str) -> dict[str, Any] | None:
+    try:
+        found = json.loads(line)
+    except ValueError:
+        return None
+    return found if isinstance(found, dict) else None

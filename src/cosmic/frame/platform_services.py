@@ -7,12 +7,13 @@ Free of Qt: helper processes use it too. Where helpers are started, and how, is 
 import faulthandler
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from cosmic.frame.windows_api import WindowsApi, load_windows_api
 
@@ -62,6 +63,13 @@ def process_exists(pid: int) -> bool | None:
     except OSError:
         return True
     return True
+
+
+def own_session() -> dict[str, Any]:
+    """Return the arguments of `Popen` by which a Ctrl+C in the console never reaches a process."""
+    if sys.platform == "win32":
+        return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+    return {"start_new_session": True}
 
 
 def run_in_background(nice: int) -> None:

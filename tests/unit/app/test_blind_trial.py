@@ -72,6 +72,25 @@ def test_a_program_that_does_not_answer_is_named(tmp_path: Path) -> None:
         SealedSession(program, "friendly", 1)
 
 
+def test_a_program_that_is_not_there_or_answers_no_json_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    program = tmp_path / "session.py"
+    assert main(["blind-trial", "--sealed-by", str(program)]) == 1
+    assert f"{program}: there is no such program" in capsys.readouterr().err
+    program.write_text('print("hello"); input()', encoding="utf-8")
+    assert main(["blind-trial", "--sealed-by", str(program)]) == 1
+    assert "with a line of JSON, but with 'hello'" in capsys.readouterr().err
+
+
+def test_a_whole_trial_by_no_recipe_makes_no_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["blind-trial", "--whole", "nosuch", "--out", str(tmp_path / "trial")]) == 1
+    assert "nosuch" in capsys.readouterr().err
+    assert not (tmp_path / "trial").exists()
+
+
 def test_an_analysis_that_is_changed_has_another_hash() -> None:
     one = [measured(0, 5e-11, 3.0)]
     assert digest_of(one) != digest_of([measured(0, 5.0001e-11, 3.0)])

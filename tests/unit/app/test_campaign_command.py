@@ -1,5 +1,6 @@
 """``cosmic campaign``: its exit code says if it did what was asked, its seed is the one given."""
 
+import hashlib
 import logging
 import math
 import re
@@ -111,6 +112,15 @@ def test_the_seed_given_is_the_one_recorded_reported_and_printed(
     assert CampaignReader(out).info().seed == 7
     assert "<td>7; " in (out / "report.html").read_text(encoding="utf-8")
     assert "seed 7" in capsys.readouterr().err
+
+
+def test_what_a_run_is_made_with_is_kept_with_its_hash(
+    recipe: Path, tmp_path: Path, qapp: object
+) -> None:
+    out = tmp_path / "out"
+    assert main(["campaign", str(recipe), "--out", str(out)]) == 0
+    kept = (out / "record" / "run-0001.json").read_bytes()
+    assert CampaignReader(out).run_records() == {1: hashlib.sha256(kept).hexdigest()}
 
 
 def test_a_campaign_is_gone_on_with_by_its_own_seed(

@@ -288,6 +288,29 @@ def test_certificates_that_cannot_be_made_say_why(
         ["--offscreen", "nan"],
         ["--screenshot", "x.png"],
         ["--theme", "pink"],
+        ["sample-size", "--spread", "-0.5"],
+        ["sample-size", "--spread", "nan"],
+        ["sample-size", "--spread", "1e9"],
+        ["sample-size", "--spread", "0.5", "--precision", "0"],
+        ["sample-size", "--spread", "0.5", "--precision", "-5"],
+        ["sample-size", "--spread", "0.5", "--precision", "nan"],
+        ["sample-size", "--spread", "0.5", "--precision", "wide"],
+        ["sample-size", "--spread", "0.5", "--shared-percent", "-1"],
+        ["sample-size", "--spread", "0.5", "--shared-percent", "nan"],
+        ["blind-trial", "--fibres", "0"],
+        ["blind-trial", "--fibres", "-1"],
+        ["blind-trial", "--sessions", "0"],
+        ["blind-trial", "--sessions", "2000"],
+        ["calibrate-force"],
+        ["calibrate-force", "--weights", "1,2", "--beam", "1e-11"],
+        ["calibrate-force", "--weights", "1,-2"],
+        ["calibrate-force", "--weights", "nan"],
+        ["calibrate-force", "--weights", "1", "--rounds", "0"],
+        ["calibrate-force", "--weights", "1", "--expanded-percent", "nan"],
+        ["calibrate-force", "--beam", "-1"],
+        ["calibrate-force", "--beam", "0"],
+        ["calibrate-force", "--beam", "nan"],
+        ["simulate", "scu-serial", "--link", "x", "--seconds", "nan"],
     ],
 )
 def test_a_wrong_command_line_is_explained(
@@ -330,6 +353,98 @@ def test_without_a_display_it_says_so_instead_of_crashing(
     monkeypatch.setattr(sys, "platform", "linux")
     assert main([]) == 1
     assert "there is no display" in complaints(capsys)[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        (["calibrate", "--certificates", "nosuch"], "--connect names; name one, or leave it out"),
+        (["--offscreen", "0", "--certificates", "nosuch"], "add --serve or --connect"),
+        (["calibrate-force", "--beam", "6e-11", "--out", "r.json"], "only readings of --weights"),
+        (["calibrate-force", "--weights", "1", "--out", "no/r.json"], "--out no/r.json: name a"),
+        (["simulate", "library", "scu3d", "--layout", "???", "--out", "x"], "device 1 is '???'"),
+        (["simulate", "library", "scu3d", "--rate", "nan", "--out", "x"], "a clock's rate must"),
+        (["simulate", "library", "scu3d", "--out", "afile"], "afile/libscu3dcontrol.c: cannot be"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_before_it_begins(
+    arguments: list[str],
+    wanted: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "afile").touch()
+    assert main(arguments) == 1
+    said = complaints(capsys)
+    assert wanted in said[-1], said
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        (["export", "."], ".: is a directory"),
+        (["export", "/"], "/: is a directory"),
+        (["session", "pack", "afile", "--output", "afile/a.zip"], "afile is no folder"),
+        (["new-device", "camera", "cam", "--out", "afile"], "cannot be written (Not a directory)"),
+        (["audit", "bytes.toml"], "bytes.toml: is no audit trail"),
+        (["audit", "afile"], "afile: is no audit trail"),
+    ],
+)
+def test_a_path_that_cannot_be_used_is_named_in_a_line(
+    arguments: list[str],
+    wanted: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "afile").write_text("some text\n", encoding="utf-8")
+    (tmp_path / "bytes.toml").write_bytes(b"\xff\xfe\x00name\n")
+    assert main(arguments) == 1
+    (said,) = complaints(capsys)
+    assert wanted in said
+
+
+def test_a_calibration_that_is_not_there_is_answered_with_those_that_are(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["calibrate", "--anew", "nosuch"]) == 1
+    said = complaints(capsys)[-1]
+    assert "there is no calibration 'nosuch'; there are: " in said
+    assert "rotation centre" in said
+
+
+def test_what_all_fibres_share_is_printed_as_it_was_given(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["sample-size", "--spread", "0.5", "--shared-percent", "50"]) == 0
+    assert "shared by all: ±50.0 %" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("error", "wanted"),
+    [
+        (FileNotFoundError(2, "No such file or directory", "a.toml"), "a.toml: No such file or"),
+        (NotADirectoryError(20, "Not a directory", b"a/b"), "a/b: Not a directory"),
+        (OSError("the bus is gone"), "the bus is gone"),
+    ],
+)
+def test_what_the_system_refuses_is_a_line_with_its_path(
+    error: OSError,
+    wanted: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def refused(_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("cosmic.app.commands.check.find_mistakes", refused)
+    assert main(["check", "platform.toml"]) == 1
+    (said,) = complaints(capsys)
+    assert said.startswith(f"cosmic: {wanted}")
 
 
 # The whole program

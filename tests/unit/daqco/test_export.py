@@ -167,3 +167,55 @@ def test_a_recording_in_progress_is_exported_as_far_as_it_is(tmp_path):
     file.flush()
     assert len(pd.read_csv(export_file(tmp_path / "run.h5", "csv"))) == 100
     file.close(complete=True)
+
+
+def test_an_export_never_replaces_the_recording_that_it_reads(recorded, monkeypatch):
+    path, _ = recorded
+    before = path.read_bytes()
+    linked, hard = path.with_name("linked"), path.with_name("hard")
+    linked.symlink_to(path)
+    hard.hardlink_to(path)
+    monkeypatch.chdir(path.parent)
+    for to in ("csv", "tdms"):
+        for out in (path, "run.h5", "./run.h5", "../" + path.parent.name + "/run.h5", linked, hard):
+            with pytest.raises(RecordingError, match="is the recording itself"):
+                export_file("run.h5", to, out, overwrite=True)
+    for export_to in (export_csv, export_tdms):
+        with (
+            open_recording(path) as recording,
+            pytest.raises(RecordingError, match="is the recording itself"),
+        ):
+            export_to(recording, linked, overwrite=True)
+    assert path.read_bytes() == before
+    assert sorted(each.name for each in path.parent.iterdir()) == ["hard", "linked", "run.h5"]
+
+
+@pytest.mark.parametrize(
+    ("called", "out"),
+    [
+        ("run.positions.csv", "run.csv"),
+        ("run.csv.part", "run.csv"),
+        ("run.csv", "run.csv"),
+    ],
+)
+def test_what_an_export_writes_beside_its_file_spares_the_recording(recorded, called, out):
+    path, _ = recorded
+    source = path.rename(path.with_name(called))
+    before = source.read_bytes()
+    with pytest.raises(RecordingError, match="is the recording itself"):
+        export_file(source, "csv", path.with_name(out), overwrite=True)
+    assert source.read_bytes() == before
+
+
+@pytest.mark.parametrize(("to", "out"), [("csv", "q.tdms"), ("tdms", "q.CSV"), ("csv", "q.h5")])
+def test_a_file_does_not_end_like_one_of_another_format(recorded, to, out):
+    path, _ = recorded
+    with pytest.raises(RecordingError, match="would be written; end it in"):
+        export_file(path, to, path.with_name(out))
+    assert not path.with_name(out).exists()
+
+
+@pytest.mark.parametrize("folder", [".", "/"])
+def test_a_folder_is_no_recording(folder):
+    with pytest.raises(RecordingError, match="is a directory"):
+        export_file(folder, "csv")

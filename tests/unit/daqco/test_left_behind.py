@@ -254,6 +254,31 @@ def test_what_cannot_be_closed_is_refused_and_stays_as_it_is(
     assert (killed.read_bytes() if killed.exists() else None) == before
 
 
+CLOSED = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from pathlib import Path
+from cosmic.daqco.core.recording_file import RecordingFile
+from unit.daqco.recording_helpers import chunks, header, volts_of
+head = header()
+file = RecordingFile(Path(sys.argv[2]), head)
+for chunk in chunks(head, volts_of(2, 60_000)):
+    file.append(chunk)
+file.close(complete=True)
+"""
+
+
+def test_repair_does_not_send_what_is_cut_off_to_repair(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    subprocess.run([sys.executable, "-c", CLOSED, TESTS, str(path)], check=True, timeout=60)
+    size = path.stat().st_size
+    for percent in range(99, 1, -3):  # what is still there when the reader gives up depends on it
+        os.truncate(path, size * percent // 100)
+        with pytest.raises(RecordingError, match="is damaged beyond what can be mended") as found:
+            close_left_open(path)
+        assert "Run cosmic repair" not in str(found.value)
+
+
 def test_a_closing_that_cannot_be_verified_is_taken_back(
     killed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,7 +7,7 @@ import secrets
 import subprocess
 import sys
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 from cosmic.app.blind_trial import (
     Measured,
@@ -20,14 +20,15 @@ from cosmic.app.blind_trial import (
     table_of,
 )
 from cosmic.autonomy.campaign.analysis import analyse, scale_in
-from cosmic.autonomy.campaign.records import STANDARD, FibreRecord
+from cosmic.autonomy.campaign.opening import read_recipe
+from cosmic.autonomy.campaign.records import STANDARD, CampaignError, FibreRecord
 from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.frame.platform_services import own_session
 from cosmic.twin.truth import TruthRecord, read_truth
 
 FROZEN: Final = "frozen.json"
 SEALED: Final = "sealed"
 SEED_BITS: Final = 48
-MOST_SESSIONS: Final = 1000
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -44,7 +45,7 @@ def run(chosen: argparse.Namespace) -> int:
         program = chosen.sealed_by or sealed_program()
         results = [
             run_session(chosen.world, chosen.fibres, program=program)
-            for _ in range(min(chosen.sessions, MOST_SESSIONS))
+            for _ in range(chosen.sessions)
         ]
     sys.stdout.write("\n".join(table_of(results)) + "\n")
     return 0
@@ -55,9 +56,12 @@ def whole(recipe: Path, folder: Path | None, world: str) -> TrialResult:
 
     Raises
     ------
+    ConfigError
+        The recipe is none.
     TrialError
         No folder is named, it is not empty, or the campaign came to nothing.
     """
+    read_recipe(recipe)  # or it is said here what is wrong with it, and not in the sealed folder
     if folder is None or (folder.exists() and any(folder.iterdir())):
         raise TrialError("a whole trial needs --out with a folder that is empty, or is not there")
     seed = secrets.randbits(SEED_BITS)
@@ -69,10 +73,14 @@ def whole(recipe: Path, folder: Path | None, world: str) -> TrialResult:
     campaign, truth = folder / "campaign", folder / SEALED / "truth.jsonl"
     command = [sys.executable, "-m", "cosmic", "campaign", str(recipe), "--out", str(campaign)]
     command += ["--seed", str(seed), "--world", world, "--truth", str(truth)]
-    with (folder / SEALED / "output.txt").open("wb") as output:  # it names the seed
-        subprocess.run(command, stdout=output, stderr=output, check=False)
+    said = folder / SEALED / "output.txt"  # it names the seed
+    with said.open("wb") as output:
+        _run_to_its_end(command, output)
     reader = CampaignReader(campaign)
-    reader.check()
+    try:
+        reader.check()
+    except CampaignError as exc:
+        raise TrialError(f"the campaign did not begin; {said} says why: {exc}") from exc
     analysis = analyse(reader)
     final = [
         Measured.of(number, result)
@@ -90,8 +98,18 @@ def whole(recipe: Path, folder: Path | None, world: str) -> TrialResult:
         if (true := true_of(known, records[each.number])) is not None
     )
     scale = scale_in(reader.analysis())
-    said = "verified" if scale is not None and scale.verified else "not verified"
-    return TrialResult(seal, frozen, rows, said)
+    words = "verified" if scale is not None and scale.verified else "not verified"
+    return TrialResult(seal, frozen, rows, words)
+
+
+def _run_to_its_end(command: list[str], output: IO[bytes]) -> None:
+    """Run a program; it ends in order where this one is interrupted."""
+    with subprocess.Popen(command, stdout=output, stderr=output, **own_session()) as process:
+        try:
+            process.wait()
+        except BaseException:
+            process.terminate()  # and it is waited for
+            raise
 
 
 def true_of(truth: TruthRecord, record: FibreRecord) -> float | None:

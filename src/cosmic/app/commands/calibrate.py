@@ -4,7 +4,7 @@ import argparse
 import sys
 from typing import Final
 
-from cosmic.app.commands.chosen_rig import chosen_rig
+from cosmic.app.commands.chosen_rig import carry_out, chosen_rig
 from cosmic.autonomy.calibrating.registry import (
     CalibrationEntry,
     CalibrationRegistry,
@@ -28,7 +28,7 @@ def run(chosen: argparse.Namespace) -> int:
         run = rig.calibrate(anew=chosen.anew, zooms=chosen.zooms)
         run.subscribe(_print_event)
         try:
-            run.run_here()
+            carry_out(run)
         except CosmicError as exc:
             sys.stderr.write(f"{exc}\n")
         for each in rig.calibrations.entries:

@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final, TextIO
 
-from cosmic.app.commands.chosen_rig import chosen_rig
+from cosmic.app.commands.chosen_rig import carry_out, chosen_rig
 from cosmic.app.rig import Rig
 from cosmic.autonomy.bending.fit import assess_campaign, in_time, measure_fibre
 from cosmic.autonomy.bending.standards import ForceScale
@@ -50,13 +50,16 @@ def run(chosen: argparse.Namespace) -> int:
     CosmicError
         There is no such channel, a load is none, or the readings cannot be used.
     """
-    with chosen_rig(chosen) as rig:
-        if chosen.beam is not None:
+    if chosen.beam is not None:
+        if chosen.out is not None:
+            raise ConfigError(f"--out {chosen.out}: only readings of --weights are written")
+        with chosen_rig(chosen) as rig:
             return by_beam(rig, chosen.beam, chosen.expanded_percent, chosen.rounds or BENDS)
-        if chosen.weights is None:
-            raise ConfigError("name --weights in milligrams, or the --beam on the plate")
-        loads = [weight(each, chosen.expanded_percent) for each in chosen.weights]
-        calibration = ForceCalibration(loads, chosen.rounds or ROUNDS)
+    loads = [weight(each, chosen.expanded_percent) for each in chosen.weights]
+    calibration = ForceCalibration(loads, chosen.rounds or ROUNDS)
+    if chosen.out is not None and (chosen.out.is_dir() or not chosen.out.parent.is_dir()):
+        raise ConfigError(f"--out {chosen.out}: name a file in a folder that there is")
+    with chosen_rig(chosen) as rig:
         before = rig.daqco.scales[checked_channel(rig.daqco, chosen.channel)]
         found = lead(calibration, rig.daqco, chosen.channel, _ask(sys.stdin, sys.stdout))
         if found is None:
@@ -185,7 +188,7 @@ def bent(rig: Rig, settings: HandlingSettings, times: int) -> ForceScale:
     try:
         with armed_beyond_parking(work):
             for _ in range(times):
-                rig.procedure(build_standard(settings), work).run_here()
+                carry_out(rig.procedure(build_standard(settings), work))
     finally:
         work.close()
     fit = settings.push.fit.model_copy(update={"fibre_width_um": settings.standard.width_um})

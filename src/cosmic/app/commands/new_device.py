@@ -39,7 +39,7 @@ def run(chosen: argparse.Namespace) -> int:
     Raises
     ------
     ConfigError
-        The name cannot be one, is taken, or the folder is there already.
+        The name cannot be one, is taken, the folder is there already, or cannot be written.
     """
     folder = write_package(chosen.kind, chosen.name, chosen.out or Path())
     sys.stdout.write(
@@ -64,7 +64,7 @@ def write_package(kind: str, name: str, out: Path) -> Path:
     Raises
     ------
     ConfigError
-        The name cannot be one, is taken, or the folder is there already.
+        The name cannot be one, is taken, the folder is there already, or cannot be written.
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
         raise ConfigError(f"{name!r} cannot be the name of a package: small letters, digits and _")
@@ -84,9 +84,14 @@ def write_package(kind: str, name: str, out: Path) -> Path:
     }
     for source, path in (*_sources("common"), *_sources(kind)):
         target = folder / str(path).replace("NAME", name).removesuffix(_ENDING)
-        target.parent.mkdir(parents=True, exist_ok=True)
         text = Template(source.read_text(encoding="utf-8")).substitute(words)
-        target.write_text(text, encoding="utf-8")
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(text, encoding="utf-8")
+        except OSError as exc:
+            raise ConfigError(
+                f"{target}: cannot be written ({exc.strerror or exc}); name another --out"
+            ) from exc
     return folder
 
 

@@ -17,9 +17,10 @@ from cosmic.autonomy.campaign.analysis import (
     settings_in,
 )
 from cosmic.autonomy.campaign.formatting import scale_words
+from cosmic.autonomy.campaign.provenance import record_file
 from cosmic.autonomy.campaign.recipe import RecipeFile, load_recipe
 from cosmic.autonomy.campaign.records import CampaignError
-from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store import CampaignStore, is_written
 from cosmic.autonomy.campaign.store_read import CampaignReader
 
 CHANGED: Final = 3
@@ -46,7 +47,11 @@ def run(chosen: argparse.Namespace) -> int:
     altered = altered_files(reader)
     analysis = analyse(reader, settings)
     found = compare(reader, analysis)
-    lines = [*lines_of(found, analysis), *(f"not as it was written: {each}" for each in altered)]
+    lines = [
+        *lines_of(found, analysis),
+        *(f"not as it was written: {each}" for each in altered),
+        *notes_of(reader),
+    ]
     sys.stdout.write("\n".join(lines) + "\n")
     if chosen.apply:
         _apply(chosen.folder, analysis)
@@ -66,6 +71,19 @@ def _apply(folder: Path, analysis: Analysis) -> None:
     wanted = RecipeFile.model_validate(tomllib.loads(store.reader.info().recipe_text)).output
     for path in write_output(folder, wanted):
         sys.stdout.write(f"{path}\n")
+
+
+def notes_of(reader: CampaignReader) -> list[str]:
+    """Return what else whoever reads the numbers should know."""
+    notes = [
+        f"{file.relative_to(reader.folder).as_posix()}: is not there, as of campaigns by a program "
+        "that kept no records; it is unknown what the run was made with"
+        for run in reader.unrecorded_runs()
+        if not (file := record_file(reader.folder, run)).exists()
+    ]
+    if is_written(reader.folder):
+        notes.append("the campaign is running: these are its values of now")
+    return notes
 
 
 def lines_of(found: Comparison, analysis: Analysis) -> list[str]:

@@ -21,7 +21,7 @@ def run(chosen: argparse.Namespace) -> int:
         The folder holds no campaign with two good fibres, or no spread is given.
     """
     mean, seen_part = _basis(chosen)
-    for line in lines_of(mean, chosen.precision or USUAL, seen_part):
+    for line in lines_of(mean, (chosen.precision,) if chosen.precision else USUAL, seen_part):
         sys.stdout.write(f"{line}\n")
     return 0
 
@@ -49,7 +49,7 @@ def _basis(chosen: argparse.Namespace) -> tuple[MeanEi, float]:
 
 def lines_of(mean: MeanEi, wanted_percent: tuple[float, ...], good_part: float) -> list[str]:
     """Return what is said: how many fibres for each precision."""
-    shared = 100.0 * TWO_SIDED * mean.common_std_ln
+    shared = 100.0 * math.expm1(TWO_SIDED * mean.common_std_ln)  # as --shared-percent has it
     lines = [
         f"spread between fibres: sd of ln(EI) {mean.spread_ln:.2f}; shared by all: ±{shared:.1f} %"
     ]

@@ -183,6 +183,11 @@ def _host(
     """Return what serves the platform to others, if it is to be served."""
     network = platform.file.network
     if not (options.serve or network.serve):
+        if options.certificates is not None and not options.stations:
+            raise ConfigError(
+                f"--certificates {options.certificates}: proves who this window is to those that "
+                "it serves, or that --connect names; add --serve or --connect, or leave it out"
+            )
         return None
     how = serving(
         network,

@@ -16,7 +16,7 @@ from cosmic.autonomy.bending.fit import assess_campaign, in_time, measure_fibre
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.standards import ForceScale, StandardReading
-from cosmic.autonomy.campaign.provenance import changed_files
+from cosmic.autonomy.campaign.provenance import changed_files, changed_records
 from cosmic.autonomy.campaign.records import (
     FIBRE,
     STANDARD,
@@ -335,8 +335,8 @@ def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
 def altered_files(reader: CampaignReader) -> tuple[str, ...]:
     """Return what of a folder, beside raw curves, is not as it was written, in words.
 
-    These are images, copies of the files that it was made with, and raw files that belong to no
-    fibre of the record.
+    These are images, what each run was made with, copies of the files of that, and raw files that
+    belong to no fibre of the record.
 
     Raises
     ------
@@ -356,7 +356,8 @@ def altered_files(reader: CampaignReader) -> tuple[str, ...]:
         if _digest(path := reader.folder / file) != sha256
     ]
     copies = [f"{each}: its copy differs or is missing" for each in changed_files(reader.folder)]
-    return (*strangers, *images, *copies)
+    records = changed_records(reader.folder, reader.run_records())
+    return (*strangers, *images, *records, *copies)
 
 
 def _digest(path: Path) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cosmic.autonomy.campaign.campaign import Campaign, Treatment
 from cosmic.autonomy.campaign.plates import CampaignPlates
-from cosmic.autonomy.campaign.provenance import Provenance, write_provenance
+from cosmic.autonomy.campaign.provenance import Provenance, sha256_of, write_provenance
 from cosmic.autonomy.campaign.recipe import Recipe, asks_the_same, load_recipe
 from cosmic.autonomy.campaign.records import TWIN, CampaignError, CampaignInfo
 from cosmic.autonomy.campaign.resume import ResumePlan, resume
@@ -123,7 +123,8 @@ def open_campaign(recipe: Recipe, folder: Path, host: CampaignHost) -> Campaign:
         undo.callback(work.close)
         store, known = _store(recipe, folder, host, work.clock.now_s())
         undo.callback(store.close)
-        write_provenance(folder, store.run, host.provenance, recipe.text)
+        record = write_provenance(folder, store.run, host.provenance, recipe.text)
+        store.keep_record(sha256_of(record))
         campaign = Campaign(
             work,
             Treatment(

@@ -68,10 +68,29 @@ def write_provenance(folder: Path, run: int, provenance: Provenance, recipe_text
         "files": listed,
         "settings": dict(provenance.settings),
     }
-    file = record / f"run-{run:04d}.json"
+    file = record_file(folder, run)
     write_whole(file, json.dumps(page, indent=1, default=str, ensure_ascii=False).encode())
     write_through(record)
     return file
+
+
+def record_file(folder: Path, run: int) -> Path:
+    """Return where it is kept what a run was made with."""
+    return folder / RECORD / f"run-{run:04d}.json"
+
+
+def sha256_of(file: Path) -> str:
+    """Return the SHA-256 of a file.
+
+    Raises
+    ------
+    CampaignError
+        It cannot be read.
+    """
+    try:
+        return hashlib.sha256(file.read_bytes()).hexdigest()
+    except OSError as exc:
+        raise CampaignError(f"{file} cannot be read: {exc.strerror or exc}") from exc
 
 
 def _content(path: Path) -> bytes:
@@ -104,25 +123,74 @@ def read_provenance(folder: Path) -> tuple[dict[str, Any], ...]:
         A file of the record cannot be read.
     """
     found = []
-    for file in sorted((folder / RECORD).glob("run-*.json")):
+    for file in _record_files(folder):
         try:
             found.append(dict(json.loads(file.read_text(encoding="utf-8"))))
-        except (OSError, ValueError) as exc:
+        except (OSError, TypeError, ValueError) as exc:
             raise CampaignError(f"{file} cannot be read: {exc}") from exc
     return tuple(found)
 
 
 def changed_files(folder: Path) -> tuple[str, ...]:
-    """Return the copies in a record that are missing, or not what was copied."""
+    """Return the copies in a record that are missing, or not what was copied.
+
+    What is wrong with the files that list them, `changed_records` says.
+    """
     wrong = []
-    for page in read_provenance(folder):
-        for name, kept in page.get("files", {}).items():
+    for file in _record_files(folder):
+        page = _page(file)
+        for name, kept in _listed(page).items():
             if "copy" not in kept:
                 continue
             try:
-                now = hashlib.sha256((folder / kept["copy"]).read_bytes()).hexdigest()
-            except OSError:
+                now = sha256_of(folder / kept["copy"])
+            except CampaignError:
                 now = ""
-            if now != kept["sha256"]:
-                wrong.append(f"{name} of run {page['run']}")
+            if now != kept.get("sha256"):
+                wrong.append(f"{name} of run {page.get('run', file.stem)}")
     return tuple(wrong)
+
+
+def changed_records(folder: Path, kept: Mapping[int, str]) -> tuple[str, ...]:
+    """Return which files that say what a run was made with are not as they were written, and how.
+
+    Parameters
+    ----------
+    kept : mapping of int to str
+        SHA-256 by the number of the run; empty where it is not known.
+    """
+    wanted = {record_file(folder, run): sha256 for run, sha256 in kept.items()}
+    others = dict.fromkeys(_record_files(folder), "")
+    return tuple(
+        f"{file.relative_to(folder).as_posix()}: {wrong}"
+        for file, sha256 in sorted((others | wanted).items())
+        if (wrong := _wrong_with(file, sha256))
+    )
+
+
+def _wrong_with(file: Path, sha256: str) -> str:
+    if not file.exists():
+        return "is missing"
+    if not _listed(_page(file)):
+        return "does not list what the run was made with"
+    return "its SHA-256 differs" if sha256 and sha256_of(file) != sha256 else ""
+
+
+def _record_files(folder: Path) -> list[Path]:
+    return sorted((folder / RECORD).glob("run-*.json"))
+
+
+def _page(file: Path) -> dict[str, Any]:
+    """Return what is in such a file; empty where it cannot be read."""
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _listed(page: Mapping[str, Any]) -> Mapping[str, Mapping[str, str]]:
+    files = page.get("files")
+    if not isinstance(files, dict) or not all(isinstance(each, dict) for each in files.values()):
+        return {}
+    return files

@@ -49,7 +49,7 @@ CREATE TABLE campaign (
 );
 CREATE TABLE run (
     number INTEGER PRIMARY KEY, started TEXT NOT NULL, versions_json TEXT NOT NULL,
-    begin_s REAL NOT NULL, end_s REAL
+    begin_s REAL NOT NULL, end_s REAL, record_sha256 TEXT NOT NULL DEFAULT ''
 );
 CREATE TABLE calibration (
     name TEXT NOT NULL, residual REAL, unit TEXT NOT NULL, made TEXT NOT NULL,
@@ -118,6 +118,7 @@ ADDED: Final = {
         "world": "TEXT NOT NULL DEFAULT ''",
         "analysis_json": "TEXT NOT NULL DEFAULT ''",
     },
+    "run": {"record_sha256": "TEXT NOT NULL DEFAULT ''"},
     "calibration": {"age_s": "REAL"},
     "fibre": {
         "budget_json": "TEXT NOT NULL DEFAULT '[]'",

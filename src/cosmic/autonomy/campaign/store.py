@@ -126,6 +126,22 @@ class FolderLock:
         self._connection.close()
 
 
+def is_written(folder: Path) -> bool:
+    """Return whether a program writes the campaign in a folder now; changes nothing."""
+    file = folder / LOCK
+    if not file.exists():
+        return False
+    try:
+        connection = sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True, timeout=0.0)
+        try:
+            connection.execute("SELECT 1 FROM sqlite_master").fetchall()
+        finally:
+            connection.close()
+    except sqlite3.Error as exc:
+        return exc.sqlite_errorcode == sqlite3.SQLITE_BUSY
+    return False
+
+
 BUSY_S: Final = 10.0
 
 
@@ -357,6 +373,11 @@ class CampaignStore:
     def run(self) -> int:
         """Number of this start of the program; 0 where nothing is gone on with."""
         return self._run
+
+    def keep_record(self, sha256: str) -> None:
+        """Note the SHA-256 of the file that says what this run is made with."""
+        with self._connection.transaction() as connection:
+            update(connection, "run", {"record_sha256": sha256}, key=self._run)
 
     def close(self) -> None:
         """Let go of the folder; without effect after the first time."""

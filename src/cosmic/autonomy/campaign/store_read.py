@@ -226,6 +226,41 @@ class CampaignReader:
             str(row["file"]) for row in rows if row["file"] and row["outcome"] not in finished
         )
 
+    def run_records(self) -> dict[int, str]:
+        """Return the runs that kept a record of what they were made with, with its SHA-256.
+
+        The hash is empty of those by an earlier program that made fibres: that they kept a record
+        is known by the commit among their versions.
+        """
+        return {
+            number: sha256
+            for number, sha256, used, recorded in self._runs()
+            if sha256 or (used and recorded)
+        }
+
+    def unrecorded_runs(self) -> tuple[int, ...]:
+        """Return the runs with fibres by a program that may not have kept records."""
+        return tuple(
+            number
+            for number, sha256, used, recorded in self._runs()
+            if used and not (sha256 or recorded)
+        )
+
+    def _runs(self) -> list[tuple[int, str, bool, bool]]:
+        rows = self._rows(
+            "SELECT *, EXISTS (SELECT 1 FROM fibre WHERE fibre.run = run.number) AS used"
+            " FROM run ORDER BY number"
+        )
+        return [
+            (
+                int(number(row["number"])),
+                str(row.get("record_sha256", "")),
+                bool(row["used"]),
+                "commit" in json.loads(str(row["versions_json"])),
+            )
+            for row in rows
+        ]
+
     def image_files(self) -> dict[str, str]:
         """Return the files of all images with their SHA-256."""
         rows = self._rows("SELECT file, sha256 FROM picture ORDER BY fibre, number")

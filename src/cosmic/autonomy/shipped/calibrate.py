@@ -1,6 +1,6 @@
 """Calibration: before fibres are handled, and everything there is on its own."""
 
-from cosmic.autonomy.calibrating.calibrated import POOR
+from cosmic.autonomy.calibrating.calibrated import POOR, Calibrated
 from cosmic.autonomy.calibrating.drift import CheckDrift
 from cosmic.autonomy.calibrating.heights import HeightByFocus, HeightsAsFiled
 from cosmic.autonomy.calibrating.touching import TouchJaw
@@ -21,7 +21,7 @@ from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.survey import Survey
 from cosmic.autonomy.handling.turning import FindRotationCentre
 from cosmic.autonomy.procedures.combinators import Fallback, Retry, Sequence
-from cosmic.autonomy.procedures.procedure import Part, Procedure
+from cosmic.autonomy.procedures.procedure import Node, Part, Procedure
 
 
 def calibrated(settings: HandlingSettings) -> tuple[Part[HandlingContext], ...]:
@@ -71,6 +71,19 @@ def build_calibrate(
         FindRotationCentre(),
     )
     return Procedure("calibrate", root, make_safe=make_safe)
+
+
+def calibration_names() -> frozenset[str]:
+    """Return the names of the calibrations that are made here, made before or not."""
+    waiting: list[Part[HandlingContext]] = [build_calibrate().root]
+    found = set()
+    while waiting:
+        part = waiting.pop()
+        if isinstance(part, Calibrated):
+            found.add(part.key)
+        elif isinstance(part, Node):
+            waiting += part.parts
+    return frozenset(found)
 
 
 def _tried(settings: HandlingSettings, part: FibreOperation) -> Part[HandlingContext]:

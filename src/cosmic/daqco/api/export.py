@@ -22,13 +22,14 @@ from cosmic.daqco.api.export_targets import (
     position_lines,
 )
 from cosmic.daqco.api.recording import Recording, open_recording
+from cosmic.daqco.core.recording_format import SUFFIX
 from cosmic.frame.errors import (
     ConfigError,
     ExportCancelled,
     RecordingError,
     RecordingExistsError,
 )
-from cosmic.frame.plugins import Backend, Kind, NoOptions, make
+from cosmic.frame.plugins import Backend, Kind, NoOptions, make, names
 
 READ_SAMPLES: Final = 32_768
 
@@ -74,7 +75,8 @@ def export_file(
     Raises
     ------
     RecordingError
-        The recording cannot be read, there is no such format, or the file cannot be written.
+        The recording cannot be read, there is no such format, or the file cannot be written; it
+        is the recording itself, or its ending that of another format.
     RecordingExistsError
         There is such a file, and `overwrite` is False.
     ExportCancelled
@@ -85,8 +87,12 @@ def export_file(
     except ConfigError as exc:
         raise RecordingError(f"cannot export to {to!r}: {exc}") from exc
     source = Path(recording_path)
+    if source.is_dir():
+        raise RecordingError(f"{source}: is a directory; name a recording in it")
     target = source.with_suffix(f".{to}") if out_path is None else Path(out_path)
     with open_recording(source) as recording:
+        _check_other(recording, target)  # whatever a format of others looks at
+        _check_suffix(target, to)
         return export(recording, target, progress, overwrite=overwrite)
 
 
@@ -118,7 +124,7 @@ def export_csv(
     }
     tables = {target: lines for target, lines in beside.items() if len(lines) > 1}
     for target in (path, *tables):
-        _check_free(target, overwrite=overwrite)
+        _check_free(recording, target, overwrite=overwrite)
     _export(recording, path, CsvTarget, progress)
     for target, lines in tables.items():
         with _replacing(target) as part, part.open("w", newline="", encoding="utf-8") as file:
@@ -139,7 +145,7 @@ def export_tdms(
     ------------------
     As `export_csv`.
     """
-    _check_free(path, overwrite=overwrite)
+    _check_free(recording, path, overwrite=overwrite)
     _export(recording, path, TdmsTarget, progress)
     return path
 
@@ -147,7 +153,7 @@ def export_tdms(
 @contextmanager
 def _replacing(path: Path) -> Iterator[Path]:
     """Write under another name, which becomes `path` only when all went well."""
-    part = path.with_name(path.name + ".part")
+    part = _part_of(path)
     try:
         yield part
         part.replace(path)
@@ -185,7 +191,36 @@ def _blocks(recording: Recording) -> Iterator[tuple[list[Values], float]]:
         yield recording.block(first, last), last / total
 
 
-def _check_free(path: Path, *, overwrite: bool) -> None:
+def _part_of(path: Path) -> Path:
+    return path.with_name(path.name + ".part")
+
+
+def _check_suffix(path: Path, to: str) -> None:
+    """Refuse what would lie about what is in the file."""
+    ending = path.suffix.lower().lstrip(".")
+    if ending != to and ending in (*names(Kind.EXPORTER), SUFFIX.lstrip(".")):
+        raise RecordingError(
+            f"{path}: ends in .{ending}, and {to} would be written; end it in .{to}, or name "
+            "another format"
+        )
+
+
+def _check_other(recording: Recording, path: Path) -> None:
+    """Refuse to write over the recording that is read, by whichever path it is named."""
+    for written in (path, _part_of(path)):
+        try:
+            same = written.samefile(recording.path)
+        except OSError:  # one is not there
+            continue
+        if same:
+            raise RecordingError(
+                f"{written}: is the recording itself, which an export never replaces; choose "
+                "another name"
+            )
+
+
+def _check_free(recording: Recording, path: Path, *, overwrite: bool) -> None:
+    _check_other(recording, path)
     if not path.parent.is_dir():
         raise RecordingError(f"directory {path.parent} does not exist; create it or choose another")
     if path.exists() and not overwrite:

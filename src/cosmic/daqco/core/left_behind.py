@@ -211,7 +211,11 @@ class _Contents:
 
 def _contents(path: Path) -> _Contents:
     """Return what a reader finds; raises `RecordingError`."""
-    source = RecordingSource(path)
+    try:
+        source = RecordingSource(path)
+    except RecordingError as exc:
+        # A reader advises this repair, which cannot bring back what is cut off.
+        raise _cut_off(path) or exc from exc
     try:
         tables = tuple(source.tables[name].tobytes() for name in sorted(source.tables))
         return _Contents(source.samples, source.samples / source.rate_hz, tables)

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from cosmic.frame.errors import NotAvailable
+from cosmic.frame.errors import ArgumentError, NotAvailable
 from cosmic.mico.hw import scu3d_ctypes, smaractctl_ctypes
 
 Make = Literal["scu3d", "smaractctl"]
@@ -74,13 +74,17 @@ _COMMUNICATION_FAILED: Final = {"scu3d": 12, "smaractctl": 0xF004}
 _kept: list[object] = []
 
 
-def fill(make: Make, address: int, layout: str, rate: float, seed: int) -> None:
-    """Load a simulated library and write the addresses of its functions into the table there."""
+def _simulated(make: Make, layout: str, rate: float, seed: int) -> object:
     from cosmic.mico.hw.sim_scu3d import load_simulated_library as load_scu3d
     from cosmic.mico.hw.sim_smaractctl import load_simulated_library as load_smaractctl
 
     load = load_scu3d if make == "scu3d" else load_smaractctl
-    library = load(layout, rate, seed)
+    return load(layout, rate, seed)
+
+
+def fill(make: Make, address: int, layout: str, rate: float, seed: int) -> None:
+    """Load a simulated library and write the addresses of its functions into the table there."""
+    library = _simulated(make, layout, rate, seed)
     _kept.append(library)
     names = _PROTOTYPES[make]
     table = (ctypes.c_void_p * len(names)).from_address(address)
@@ -128,13 +132,24 @@ def build(make: Make, folder: Path, *, layout: str, rate: float, seed: int) -> P
 
     Raises
     ------
+    ArgumentError
+        Layout or rate are none.
     NotAvailable
-        There is no C compiler named gcc, or it failed.
+        There is no C compiler named gcc, it failed, or the folder cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        _simulated(make, layout, rate, seed)  # what it would fail with in the program that uses it
+    except ValueError as exc:
+        raise ArgumentError(f"{FILES[make]} cannot be built so: {exc}") from exc
     library = folder / FILES[make]
     written = library.with_suffix(".c")
-    written.write_text(source(make, layout=layout, rate=rate, seed=seed), "utf-8")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        written.write_text(source(make, layout=layout, rate=rate, seed=seed), "utf-8")
+    except OSError as exc:
+        raise NotAvailable(
+            f"{written}: cannot be written ({exc.strerror or exc}); name another folder"
+        ) from exc
     command = [
         "gcc",
         "-O2",

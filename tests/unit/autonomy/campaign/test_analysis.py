@@ -10,6 +10,7 @@ import pytest
 
 from cosmic.app.cli import main
 from cosmic.autonomy.campaign.analysis import analyse, compare, finish, scale_in, settings_in
+from cosmic.autonomy.campaign.provenance import Provenance, sha256_of, write_provenance
 from cosmic.autonomy.campaign.records import STANDARD, CampaignError, Outcome, Shape
 from cosmic.autonomy.campaign.report import write_report
 from cosmic.autonomy.campaign.stop_rule import StandardSchedule
@@ -144,6 +145,79 @@ def test_what_beside_the_raw_files_is_not_as_it_was_written_is_named(
     assert f"{image.name}: its SHA-256 differs" in said
     assert "fibres/00077.h5 belongs to no fibre of the record" in said
     assert main(["recompute", str(campaign)]) == 0
+
+
+def recorded(campaign: Path, folder: Path, *, hashed: bool) -> Path:
+    """A copy whose run kept what it was made with; not `hashed`: by a program of before."""
+    copied(campaign, folder)
+    file = write_provenance(folder, 1, Provenance(facts={"seed": 7}), RECIPE)
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        if hashed:
+            base.execute("UPDATE run SET record_sha256 = ?", (sha256_of(file),))
+        else:
+            base.execute("ALTER TABLE run DROP COLUMN record_sha256")
+            base.execute("UPDATE run SET versions_json = ?", ('{"commit": "abc"}',))
+    base.close()
+    return folder
+
+
+@pytest.mark.parametrize("hashed", [True, False])
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        (None, "is missing"),
+        ("", "does not list what the run was made with"),
+        ("{}", "does not list what the run was made with"),
+        ("[1]", "does not list what the run was made with"),
+        ('{"files": {"recipe.toml": 7}}', "does not list what the run was made with"),
+    ],
+)
+def test_a_run_file_that_was_removed_or_emptied_is_named(
+    campaign: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    *,
+    hashed: bool,
+    text: str | None,
+    wanted: str,
+) -> None:
+    folder = recorded(campaign, tmp_path / "copy", hashed=hashed)
+    assert main(["recompute", str(folder)]) == 0
+    file = folder / "record" / "run-0001.json"
+    if text is None:
+        shutil.rmtree(folder / "record")
+    else:
+        file.write_text(text, "utf-8")
+    assert main(["recompute", str(folder)]) == 4
+    assert f"not as it was written: record/run-0001.json: {wanted}" in capsys.readouterr().out
+
+
+def test_a_run_file_that_says_something_else_now_is_named(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = recorded(campaign, tmp_path / "copy", hashed=True)
+    file = folder / "record" / "run-0001.json"
+    file.write_text(file.read_text("utf-8").replace('"seed": 7', '"seed": 8'), "utf-8")
+    assert main(["recompute", str(folder)]) == 4
+    assert "record/run-0001.json: its SHA-256 differs" in capsys.readouterr().out
+
+
+def test_a_campaign_of_before_records_were_kept_is_recomputed_and_says_so(
+    campaign: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["recompute", str(campaign)]) == 0
+    assert "record/run-0001.json: is not there, as of campaigns by" in capsys.readouterr().out
+
+
+def test_of_a_running_campaign_it_says_that_it_is_running(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with CampaignStore.open(folder, run=False):
+        assert main(["recompute", str(folder)]) == 0
+        assert "the campaign is running: these are its values of now" in capsys.readouterr().out
+    assert main(["recompute", str(folder)]) == 0
+    assert "is running" not in capsys.readouterr().out
 
 
 def test_a_value_that_no_raw_file_stands_for_is_named(
