@@ -107,6 +107,9 @@ def test_odd_arguments_are_named_and_break_nothing(
             if found := complaint(call, parameter, odd, error):
                 wrong[found] = None
     rig.daqco.stop_recording()
+    for loop in rig.control.loops:  # of an argument that was not odd enough
+        loop.stop()
+        loop.join()
     assert not wrong, "\n".join(wrong)
     assert tries > 0
 

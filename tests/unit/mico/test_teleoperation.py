@@ -205,7 +205,7 @@ def test_a_failed_input_thread_stops_everything():
         wait_until(lambda: it.controller.stopped_after(lost_s) is not None)
         assert it.controller.stopped_after(lost_s) < 0.1
         wait_until(lambda: it.phase is Phase.STOPPED)
-        assert it.api.application.manager.latch.state.latched
+        wait_until(lambda: it.api.application.manager.latch.state.latched)
         wait_until(lambda: it.hand.closed == 1)
 
 

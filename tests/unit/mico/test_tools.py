@@ -174,7 +174,7 @@ def test_an_unknown_tool_axis_or_position_is_named(rig):
             rig.mico.nearest({"left.x": value})
 
 
-def test_a_jog_that_is_too_fast_is_told_how_fast_it_may_be(rig):
+def test_a_jog_that_is_too_fast_says_how_fast_it_may_be(rig):
     with pytest.raises(cosmic.MoveRefused, match="above 0 and up to 18500 um/s, not 20000"):
         rig.mico["left.x"].jog(1, speed=20000.0)
 
