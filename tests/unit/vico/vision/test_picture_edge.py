@@ -101,3 +101,13 @@ def test_a_fibre_that_lies_along_the_rows_is_a_fibre() -> None:
     line = np.column_stack([np.linspace(100.0, 400.0, 1200), np.full(1200, 240.0)])
     (found,) = find_fibres(drawn_image([line], [10.0]))
     assert found.certain
+
+
+def test_ground_that_falls_below_what_a_camera_sees_is_no_rim() -> None:
+    line = arc((120.0, 240.0), 0.0, 300.0, 0.1)
+    end = line[-1, 0]
+    fall = np.interp(COLUMNS, [end - 30.0, end + 10.0], [8.0, -15.0])
+    image = drawn_image([line], [10.0], contrast=80.0, ground=100.0, noise=2.0) - 100.0
+    seen = np.clip(np.round(image + fall), 0, 255).astype(np.uint8)
+    (found,) = find_fibres(seen)
+    assert CUT not in found.doubts
