@@ -57,6 +57,7 @@ def figures(tally: Tally) -> list[Figure]:
         Figure(NAME, "starts of the program", tally.lives, "starts"),
         Figure(NAME, "finished fibres", tally.finished, "fibres"),
         Figure(NAME, "fibres cut off, of campaigns that ended", tally.spoilt, "fibres"),
+        Figure(NAME, "starts that were refused", tally.refused, "starts", none),
         Figure(NAME, "records lost", tally.lost + tally.unannounced, "fibres", none),
         Figure(NAME, "records changed afterwards", tally.changed, "fibres", none),
         Figure(NAME, "fibres measured twice", tally.doubled, "fibres", none),
