@@ -218,11 +218,12 @@ def test_nothing_that_moves_axes_begins_beside_a_campaign_or_a_calibration(
             campaign.join()
         other = rig.campaign("quick", tmp_path / "two")
         second = rig.calibrate()
+        replayed = rig.replay(RecordedProcedure(name="light", step=[PauseStep(seconds=0.1)]))
         early.start()
         try:
             with pytest.raises(cosmic.NotAvailable, match="calibrate is running"):
                 rig.campaign("quick", tmp_path / "three")
-            for begin in (other.start, second.start):
+            for begin in (other.start, second.start, replayed.start):
                 with pytest.raises(cosmic.NotAvailable, match="calibrate is running"):
                     begin()
         finally:

@@ -233,7 +233,7 @@ class Rig:
         if other := self.running:
             raise NotAvailable(f"{other} is running; end it first")
         procedure, work = calibration_on(self, settings, anew, zooms=zooms)
-        run = self._made(procedure, work, lambda: self.running)
+        run = self._alone(procedure, work)
 
         def close() -> None:
             if run.over:
@@ -256,7 +256,7 @@ class Rig:
 
             with self._shared.lock:
                 if self._shared.handling is None:
-                    made = FibreHandling(self, self.procedure, lambda: self.running)
+                    made = FibreHandling(self, self._alone, lambda: self.running)
                     self._handling = self._shared.handling = made
                 else:
                     self._handling = self._shared.handling.commanding_by(self)
@@ -332,6 +332,10 @@ class Rig:
             What its operations share, such as this rig and what they find.
         """
         return self._made(procedure, work, lambda: A_CAMPAIGN if self.running == A_CAMPAIGN else "")
+
+    def _alone(self, procedure: Procedure[W], work: W) -> ProcedureRun[W]:
+        """Return a run that begins only while nothing else runs."""
+        return self._made(procedure, work, lambda: self.running)
 
     def _made(self, procedure: Procedure[W], work: W, busy: Callable[[], str]) -> ProcedureRun[W]:
         run = ProcedureRun(
