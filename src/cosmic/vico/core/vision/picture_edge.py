@@ -69,10 +69,9 @@ def _side(scene: Scene, points: Floats, explained: Mask) -> Floats:
     x, y = (points[..., axis].astype(np.float32) for axis in (0, 1))
     right, bottom = scene.corner
     free = (x >= 0) & (x <= right) & (y >= 0) & (y <= bottom)
-    free &= (
-        sample(explained.astype(np.float32), scene.reduced_by_axis(x), scene.reduced_by_axis(y))
-        < 0.1
-    )
+    columns, rows = (np.rint(scene.reduced_by_axis(each)).astype(int) for each in (x, y))
+    last_row, last_column = np.array(explained.shape) - 1
+    free &= explained[np.clip(rows, 0, last_row), np.clip(columns, 0, last_column)] == 0
     return np.where(free, sample(scene.image, x, y).astype(np.float64), np.nan)
 
 
@@ -97,6 +96,6 @@ def _goes_still(scene: Scene, side: Floats, size: int) -> bool:
     before, behind = side[:, :size], side[:, -size:]
     if not (np.isfinite(before).all() and np.isfinite(behind).all()):
         return False
-    level = float(behind[0, 0])
-    inside = float(scene.image.min()) < level < float(scene.image.max())
-    return inside and bool(np.ptp(behind) == 0.0) and bool(np.ptp(before) > 0.0)
+    if np.ptp(behind) > 0.0 or np.ptp(before) == 0.0:
+        return False
+    return float(scene.image.min()) < float(behind[0, 0]) < float(scene.image.max())
