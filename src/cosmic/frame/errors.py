@@ -33,12 +33,11 @@ class QuantityError(CosmicError, ValueError):
     """A text is not a number with a unit that fits."""
 
 
-class _UnknownName(CosmicError, KeyError):  # noqa: N818 - its kinds are the errors
-    KIND, KINDS = "name", "names"
+class UnknownAxisError(CosmicError, KeyError):
+    """No axis of that name; the text lists those there are."""
 
     def __init__(self, name: object, known: Iterable[str]) -> None:
-        there = ", ".join(known) or "none"
-        self.text = f"there is no {self.KIND} {name!r}; known {self.KINDS}: {there}"
+        self.text = f"there is no axis {name!r}; known axes: {', '.join(known) or 'none'}"
         super().__init__(self.text)
 
     @override
@@ -46,16 +45,16 @@ class _UnknownName(CosmicError, KeyError):  # noqa: N818 - its kinds are the err
         return self.text
 
 
-class UnknownAxisError(_UnknownName):
-    """No axis of that name; the text lists those there are."""
-
-    KIND, KINDS = "axis", "axes"
-
-
-class UnknownToolError(_UnknownName):
+class UnknownToolError(CosmicError, KeyError):
     """No tool of that name; the text lists those there are."""
 
-    KIND, KINDS = "tool", "tools"
+    def __init__(self, name: object, known: Iterable[str]) -> None:
+        self.text = f"there is no tool {name!r}; known tools: {', '.join(known) or 'none'}"
+        super().__init__(self.text)
+
+    @override
+    def __str__(self) -> str:
+        return self.text
 
 
 class WrongThreadError(CosmicError):
