@@ -46,6 +46,14 @@ def scale_words(scale: ForceScale | None) -> str:
     return "; ".join((text, *scale.reasons))
 
 
+def length_words(shape: Shape) -> str:
+    """Return a length with its 95 % interval; where it may be that of a part it says so."""
+    text = f"{with_interval(shape.length_um, shape.length_std_um)} µm"
+    # Rounded down: what is not certain is never told as 100 %.
+    percent = math.floor(1000.0 * shape.probability) / 10.0 if shape.doubted else 100.0
+    return f"{text} (a whole fibre: {percent:g} %)" if shape.doubted else text
+
+
 def width_words(shape: Shape) -> str:
     """Return a width with its 95 % interval; one that was not resolved says so."""
     text = with_interval(shape.width_um, shape.width_std_um, 1)

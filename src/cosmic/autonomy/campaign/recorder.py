@@ -245,6 +245,7 @@ def record_of(
             width_std_um=fibre.width_std_um,
             curl=fibre.curl,
             curl_std=fibre.curl_std,
+            probability=fibre.probability,
         ),
         cause=cause,
         text=text,

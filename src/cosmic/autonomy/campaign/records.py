@@ -24,6 +24,8 @@ NOT_TRUSTED: Final = "not trusted"
 """Cause of a fibre whose result may not be used."""
 FIBRE: Final = "fibre"
 STANDARD: Final = "standard"
+CERTAIN: Final = 0.999
+"""From this probability on vision calls a fibre certain."""
 UNRESOLVED: Final = 0.12
 """A width that is known no better than to this part of it was not resolved."""
 
@@ -67,6 +69,8 @@ class Shape:
         Length over the distance of the ends, less one.
     length_std_um, width_std_um, curl_std : float
         Standard deviations.
+    probability : float
+        That it is one whole fibre: where it is not certain, the length may be that of a part.
     """
 
     length_um: float = math.nan
@@ -75,6 +79,12 @@ class Shape:
     curl: float = math.nan
     width_std_um: float = math.nan
     curl_std: float = math.nan
+    probability: float = math.nan
+
+    @property
+    def doubted(self) -> bool:
+        """It is known, and not certain, that it is one whole fibre."""
+        return self.probability < CERTAIN
 
     @property
     def width_resolved(self) -> bool:

@@ -27,6 +27,7 @@ from cosmic.autonomy.campaign.formatting import (
     combined_std,
     duration,
     interval,
+    length_words,
     mean_words,
     number,
     outcome_words,
@@ -197,6 +198,7 @@ def _templates() -> Environment:
         "interval": interval,
         "outcome_words": outcome_words,
         "stiffness": stiffness,
+        "length_words": length_words,
         "width_words": width_words,
         "with_interval": with_interval,
     }

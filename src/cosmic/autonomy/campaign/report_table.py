@@ -40,6 +40,7 @@ COLUMNS: Final = (
     "flags",
     "reasons",
     "plate",
+    "probability",
 )
 
 
@@ -115,4 +116,5 @@ def _row(record: FibreRecord) -> dict[str, Value]:
         "flags": "" if result is None else "; ".join(sorted(result.flags)),
         "reasons": "" if result is None else "; ".join(result.reasons),
         "plate": record.plate,
+        "probability": record.shape.probability,
     }

@@ -71,7 +71,7 @@ CREATE TABLE fibre (
     budget_json TEXT NOT NULL DEFAULT '[]', scale_verified INTEGER NOT NULL DEFAULT 0,
     notes TEXT NOT NULL DEFAULT '', role TEXT NOT NULL DEFAULT 'fibre',
     file_sha256 TEXT NOT NULL DEFAULT '', online_ei_n_m2 REAL,
-    online_outcome TEXT NOT NULL DEFAULT '', plate INTEGER NOT NULL DEFAULT 1
+    online_outcome TEXT NOT NULL DEFAULT '', plate INTEGER NOT NULL DEFAULT 1, probability REAL
 );
 CREATE TABLE span (
     fibre INTEGER NOT NULL REFERENCES fibre, number INTEGER NOT NULL,
@@ -129,6 +129,7 @@ ADDED: Final = {
         "online_ei_n_m2": "REAL",
         "online_outcome": "TEXT NOT NULL DEFAULT ''",
         "plate": "INTEGER NOT NULL DEFAULT 1",
+        "probability": "REAL",
     },
 }
 """Columns that a campaign begun with an earlier program does not have."""
@@ -165,6 +166,7 @@ SHAPE_NUMBERS: Final = (
     "width_std_um",
     "curl",
     "curl_std",
+    "probability",
 )
 REGION_NUMBERS: Final = (
     "region_left_px",

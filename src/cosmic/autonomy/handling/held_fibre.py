@@ -1,5 +1,6 @@
 """`HeldFibre`: the fibre that is being handled, as it becomes known."""
 
+import math
 from dataclasses import dataclass, field
 
 from cosmic.autonomy.bending.fit import MeasuredFibre
@@ -114,6 +115,11 @@ class HeldFibre:
     def length_std_um(self) -> float:
         """Standard deviation of the length; nan where nobody knows."""
         return (self.seen or self.reach.candidate).length_std_um
+
+    @property
+    def probability(self) -> float:
+        """Of one whole fibre, as it was seen; nan where nobody knows."""
+        return self.seen.fibre.probability if self.seen is not None else math.nan
 
     @property
     def width_std_um(self) -> float:

@@ -39,6 +39,8 @@ class Candidate:
         Their standard deviations; nan where nobody knows.
     problem : str
         Why it is not taken; empty when it may be.
+    doubted : bool
+        It is not certain that it is one whole fibre.
     """
 
     line_um: Floats
@@ -50,6 +52,7 @@ class Candidate:
     length_std_um: float = math.nan
     width_std_um: float = math.nan
     curl_std: float = math.nan
+    doubted: bool = False
 
     def moved(self, line_um: Floats) -> "Candidate":
         """Return the same fibre on another line."""

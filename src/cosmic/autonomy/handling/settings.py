@@ -100,6 +100,11 @@ class GraspSettings(StrictModel):
         Length of fibres that are taken.
     curliest : float
         Largest curl of fibres that are taken: length over projected length, less one.
+    least_probability : float
+        Of fibres that are taken though it is not certain that they are seen as a whole; those that
+        are certain come first.
+    views : int
+        At how many angles of the table a plate is looked at before it is said that nothing is left.
     inside_um : float
         Length of fibre between the jaws.
     clear_um : float
@@ -129,6 +134,8 @@ class GraspSettings(StrictModel):
     shortest_um: float = Field(500.0, gt=0.0)
     longest_um: float = Field(4000.0, gt=0.0)
     curliest: float = Field(0.12, gt=0.0)
+    least_probability: float = Field(0.5, ge=0.0, le=1.0)
+    views: int = Field(3, ge=1, le=4)
     inside_um: float = Field(250.0, gt=0.0)
     clear_um: float = Field(55.0, gt=0.0)
     gap_um: float = Field(240.0, gt=0.0, le=1000.0)

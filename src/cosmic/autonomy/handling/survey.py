@@ -12,7 +12,7 @@ from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Neighbours, Reach, distance_um, reaches
 from cosmic.autonomy.handling.prepare import clear_image
-from cosmic.autonomy.handling.settings import StandardSettings
+from cosmic.autonomy.handling.settings import GraspSettings, StandardSettings
 from cosmic.autonomy.handling.sight import SeenFibre, find_seen
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.vico.core.image import CameraImage
@@ -39,10 +39,18 @@ STANDARD_CURL = 0.01
 DROPPED_LENGTH = 0.004
 DROPPED_WIDTH = 0.15
 DROPPED_CURL = 0.006
+WHOLE_OR_NOT = ("weak signs", "another piece begins", "less sharp", "goes on beyond")
+"""Words of doubts that what is seen is the whole fibre: it can be held and bent all the same."""
+VIEW_DEG = 70.0
+ANOTHER_VIEW = frozenset({NOT_CERTAIN, CROSSING, OUT_OF_FIELD})
+"""Problems that an image of the plate at another angle may not have."""
 
 
 class Survey(FibreOperation):
-    """A wide image, and what lies on it; only when it is due."""
+    """A wide image, and what lies on it; only when it is due.
+
+    Where nothing on it can be taken the plate is turned, and looked at again.
+    """
 
     name = "survey"
 
@@ -52,13 +60,30 @@ class Survey(FibreOperation):
         if work.shared.surveyed and work.shared.candidates and not due:
             return
         yield from clear_image(work)
+        yield from self._look(work)
+        for angle in views_deg(work.table_deg, work.settings.grasp):
+            if can_be_taken(work) or ANOTHER_VIEW.isdisjoint(work.shared.skip_reasons):
+                break
+            yield work.go({work.table: angle})
+            yield from self._look(work)
+        if not work.shared.candidates:
+            raise OperationFailed(NONE_LEFT, none_left(work.shared.skip_reasons))
+        yield SAFE_POINT
+
+    def _look(self, work: HandlingContext) -> Steps:
         image = yield work.image()
         assert isinstance(image, CameraImage)
         mapped = work.mapped(image)
         look(work, find_seen(image, mapped))
-        if not work.shared.candidates:
-            raise OperationFailed(NONE_LEFT, none_left(work.shared.skip_reasons))
-        yield SAFE_POINT
+
+
+def views_deg(angle_deg: float, settings: GraspSettings) -> list[float]:
+    """Return the angles of the table at which a plate is looked at again, from where it stands."""
+    largest = settings.largest_turn_deg
+    turns = [VIEW_DEG * turn for turn in (1, -1, 2, -2)]
+    return [angle_deg + turn for turn in turns if abs(angle_deg + turn) <= largest][
+        : settings.views - 1
+    ]
 
 
 def none_left(skip_reasons: Mapping[str, int]) -> str:
@@ -131,7 +156,7 @@ def _candidate(work: HandlingContext, seen: SeenFibre, line_um: Floats) -> Candi
         problem = OUT_OF_FIELD
     elif "cross" in doubts or "branch" in doubts or "several" in doubts:
         problem = CROSSING
-    elif not seen.fibre.certain:
+    elif not seen.fibre.certain and not _worth_trying(seen, settings):
         problem = NOT_CERTAIN
     elif seen.length_um < settings.shortest_um:
         problem = TOO_SHORT
@@ -149,7 +174,14 @@ def _candidate(work: HandlingContext, seen: SeenFibre, line_um: Floats) -> Candi
         seen.length_std_um,
         seen.width_std_um,
         seen.curl_std,
+        doubted=not seen.fibre.certain,
     )
+
+
+def _worth_trying(seen: SeenFibre, settings: GraspSettings) -> bool:
+    """Return whether it is only doubted that all of the fibre is seen, and little."""
+    known = all(any(words in doubt for words in WHOLE_OR_NOT) for doubt in seen.fibre.doubts)
+    return known and seen.fibre.probability >= settings.least_probability
 
 
 def standard_among(found: list[Candidate], settings: StandardSettings) -> Candidate | None:
@@ -231,7 +263,8 @@ class Choose(FibreOperation):
 
     def rank(self, work: HandlingContext, approach: Reach, angle_deg: float) -> tuple[float, ...]:  # noqa: ARG002
         """Return by what the best way is known: the smallest."""
-        return approach.under, abs(approach.angle_deg - angle_deg)
+        doubted = approach.candidate.doubted
+        return approach.under, doubted, abs(approach.angle_deg - angle_deg)
 
     def none(self, work: HandlingContext) -> OperationFailed:
         """Return what it fails with where none can be taken."""
@@ -267,6 +300,11 @@ def sighted(work: HandlingContext) -> list[Candidate]:
         ),
         *work.shared.unsuitable,
     ]
+
+
+def can_be_taken(work: HandlingContext) -> bool:
+    """Return whether the last survey saw a fibre that is taken, and within reach."""
+    return any(_reached(work, each) for each in work.shared.candidates)
 
 
 def _reached(work: HandlingContext, candidate: Candidate) -> bool:

@@ -15,6 +15,9 @@ from cosmic.autonomy.handling.settings import HandlingSettings, StandardSettings
 from cosmic.autonomy.handling.survey import Choose, look
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.frame.clock import ManualClock
+from cosmic.vico.core.vision.beyond import GOES_ON, SOFT
+from cosmic.vico.core.vision.certainty import IMPROBABLE
+from cosmic.vico.core.vision.checks import CONTINUES, PARTED
 
 SCALE_UM_PX = 7.6
 FAINT = "hardly stands out from the noise"
@@ -57,6 +60,7 @@ class Seen:
         angle_deg: float = 60.0,
         curl: float = 0.01,
         doubts: tuple[str, ...] = (),
+        probability: float = 1.0,
     ) -> None:
         way = np.linspace(-length_um / 2, length_um / 2, 80)
         angle = math.radians(angle_deg)
@@ -65,6 +69,7 @@ class Seen:
         self.length_std_um, self.width_std_um, self.curl_std = 2.0, 1.5, 0.001
         self.fibre: Any = self
         self.curl, self.doubts, self.certain, self.contrast = curl, doubts, not doubts, 60.0
+        self.probability = probability
 
 
 def looked(*seen: Seen) -> Bench:
@@ -89,6 +94,117 @@ def test_what_is_not_taken_is_counted_by_its_reason(seen: Seen, problem: str):
     bench = looked(seen)
     assert bench.shared.candidates == []
     assert bench.shared.skip_reasons == {problem: 1}
+
+
+WHOLE_OR_NOT = (IMPROBABLE, CONTINUES, GOES_ON, SOFT)
+
+
+@pytest.mark.parametrize("doubt", WHOLE_OR_NOT)
+def test_one_that_is_probably_whole_is_taken_and_said_to_be_doubted(doubt: str):
+    bench = looked(Seen(0.0, 0.0, doubts=(doubt,), probability=0.7))
+    assert [each.doubted for each in bench.shared.candidates] == [True]
+    bench = looked(Seen(0.0, 0.0, doubts=(doubt,), probability=0.3))
+    assert bench.shared.skip_reasons == {survey.NOT_CERTAIN: 1}
+
+
+def test_what_else_is_doubted_is_left_however_probable():
+    for doubts in ((PARTED,), (IMPROBABLE, PARTED)):
+        bench = looked(Seen(0.0, 0.0, doubts=doubts, probability=0.99))
+        assert bench.shared.skip_reasons == {survey.NOT_CERTAIN: 1}
+
+
+def test_a_certain_fibre_is_taken_before_one_that_is_doubted():
+    near = Seen(0.0, 0.0, angle_deg=2.0, doubts=(CONTINUES,), probability=0.9)
+    bench = looked(near, Seen(-1500.0, 900.0, angle_deg=60.0))
+    taken = []
+    for _ in range(2):
+        for _ in Choose().run(bench):
+            pass
+        taken.append(bench.held_fibre().reach.candidate.doubted)
+    assert taken == [False, True]
+
+
+class Turning(Bench):
+    """A plate that turns, on which other fibres are seen at other angles."""
+
+    def __init__(self, *views: list[Seen]) -> None:
+        super().__init__()
+        self.angle_deg, self.views, self.seen_at = 10.0, list(views), []
+
+    @property
+    @override
+    def table_deg(self) -> float:
+        return self.angle_deg
+
+    @property
+    @override
+    def table(self) -> str:
+        return "table.rotation"
+
+    @override
+    def image(self) -> Any:
+        return "image"
+
+    @override
+    def mapped(self, image: Any, height_um: float | None = None) -> Any:
+        return None
+
+    @override
+    def go(self, targets: Any) -> Any:
+        return targets
+
+    def look_at_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Carry the survey out."""
+
+        def found(_image: Any, _mapped: Any) -> list[Seen]:
+            self.seen_at.append(self.angle_deg)
+            return self.views.pop(0) if self.views else []
+
+        monkeypatch.setattr(survey, "clear_image", lambda _: iter(()))
+        monkeypatch.setattr(survey, "find_seen", found)
+        monkeypatch.setattr(survey, "CameraImage", str)
+        steps = survey.Survey().steps(self)
+        answer: Any = None
+        while True:
+            try:
+                asked = steps.send(answer)
+            except StopIteration:
+                return
+            if isinstance(asked, dict):
+                (self.angle_deg,) = asked.values()
+            answer = asked
+
+
+UNSURE = Seen(0.0, 0.0, doubts=(PARTED,))
+
+
+def test_where_nothing_can_be_taken_the_plate_is_looked_at_from_other_sides(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    bench = Turning([UNSURE], [Seen(0.0, 0.0)])
+    bench.look_at_it(monkeypatch)
+    assert bench.seen_at == [10.0, 80.0]
+    assert len(bench.shared.candidates) == 1
+    assert bench.shared.survey_deg == 80.0
+
+
+@pytest.mark.parametrize(
+    ("views", "angles"),
+    [
+        ([[UNSURE]] * 4, [10.0, 80.0, -60.0]),
+        ([[]] * 4, [10.0]),
+        ([[Seen(0.0, 0.0, length_um=300.0)]] * 4, [10.0]),
+    ],
+    ids=["seen from three sides", "empty", "no side would help"],
+)
+def test_after_some_sides_nothing_is_left(
+    views: list[list[Seen]], angles: list[float], monkeypatch: pytest.MonkeyPatch
+):
+    bench = Turning(*views)
+    with pytest.raises(OperationFailed) as failed:
+        bench.look_at_it(monkeypatch)
+    assert failed.value.cause == survey.NONE_LEFT
+    assert bench.seen_at == angles
 
 
 @pytest.mark.parametrize(

@@ -79,6 +79,18 @@ def test_ground_between_two_fibres_is_no_hollow(apart: float) -> None:
     assert not certain(drawn_image(beside, [7.0, 7.0]))
 
 
+@pytest.mark.parametrize("lighter", [False, True], ids=["darker", "lighter"])
+@pytest.mark.parametrize(("apart", "count"), [(40.0, 8), (50.0, 4), (60.0, 12)])
+def test_fibres_side_by_side_are_found_and_not_the_ground_between_them(
+    apart: float, count: int, lighter: bool
+) -> None:
+    lines = [arc((250.0 + apart * each, 200.0), 1.57, 300.0, 0.2) for each in range(count)]
+    image = drawn_image(lines, [7.0] * count, shape=(700, 1200), noise=1.0)
+    fibres = certain(255 - image if lighter else image)
+    assert len(fibres) == count
+    assert [each.width_px for each in fibres] == pytest.approx([7.0] * count, abs=0.4)
+
+
 def test_a_fibre_that_crosses_itself_is_followed_through() -> None:
     fibre = only(drawn_image([LOOP], [9.0]))
     assert fibre.certain, fibre.doubts

@@ -27,6 +27,7 @@ from cosmic.autonomy.campaign.formatting import (
     NONE,
     TWO_SIDED,
     interval,
+    length_words,
     number,
     stiffness,
     width_words,
@@ -396,7 +397,7 @@ def _numbers(card: FibreCardData) -> list[tuple[str, str]]:
         words = f"{stiffness(ei.ei_n_m2)} ({bounds}) {EI_LABEL}{trusted}"
         rows.append(("stiffness (95 %)", words))
     rows += [
-        ("length (95 %)", f"{with_interval(shape.length_um, shape.length_std_um)} µm"),
+        ("length (95 %)", length_words(shape)),
         ("width (95 %)", f"{width_words(shape)} µm"),
         ("curl (95 %)", with_interval(shape.curl, shape.curl_std, 3)),
     ]

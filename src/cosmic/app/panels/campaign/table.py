@@ -20,10 +20,10 @@ from cosmic.autonomy.campaign.formatting import (
     EI_LABEL,
     NONE,
     interval,
+    length_words,
     number,
     stiffness,
     width_words,
-    with_interval,
 )
 from cosmic.autonomy.campaign.records import Outcome
 from cosmic.autonomy.campaign.snapshot import FibreRow
@@ -144,7 +144,7 @@ def _tip(row: FibreRow, column: int) -> str | None:
     if column == WIDTH:
         return f"{width_words(row.shape)} µm (95 %)"
     if column == LENGTH:
-        return f"{with_interval(row.shape.length_um, row.shape.length_std_um)} µm (95 %)"
+        return f"{length_words(row.shape)} (95 %)"
     return row.cause if column == CAUSE and row.cause else None
 
 

@@ -23,6 +23,11 @@ BLOCK_PX = 8
 FEWEST_BLOCKS = 8
 MOST_LINES = 120
 LEAST_DIFFERENCE = 0.02
+# What the ground is like around something: how wide that is, and how much of it must be ground.
+GROUND_PART = 4
+LEAST_GROUND = 0.05
+# Walls are as much like fibres as what they enclose, or nearly.
+LEAST_WALLS = 0.1
 # A network fills the image, a fibre does not.
 CROWDED = 0.25
 
@@ -119,11 +124,20 @@ def find_relief(image: Pixels) -> Relief:
     floor = LEAST_LEVELS if image.dtype == np.uint8 else LEAST_LEVELS * level_step(image)
     strongest = max(float(np.percentile(height[::2, ::2], 99.8)) for _, height in hats)
     floor = max(floor, OF_STRONGEST * strongest)
-    found = [(lighter, height, threshold(height, floor)) for lighter, height in hats]
-    found.sort(key=lambda each: -fibre_like(each[1], each[2]))
-    masks = [thresholded(height, level) for _, height, level in found]
-    chosen = 1 if lined(masks[0], masks[1]) else 0
-    (lighter, height, _), mask = found[chosen], masks[chosen]
+    levels = [threshold(height, floor) for _, height in hats]
+    ground = ground_around(
+        small, [height > level for (_, height), level in zip(hats, levels, strict=True)]
+    )
+    found = [
+        (fibre_like(height, level, off(small, ground, height, lighter=lighter)), *which, level)
+        for which, level in zip(hats, levels, strict=True)
+        for lighter, height in [which]
+    ]
+    found.sort(key=lambda each: -each[0])
+    masks = [thresholded(height, level) for _, _, height, level in found]
+    within = found[1][0] > LEAST_WALLS * found[0][0] and lined(masks[0], masks[1])
+    chosen = 1 if within else 0
+    (_, lighter, height, _), mask = found[chosen], masks[chosen]
     crowded = float(mask.mean()) > CROWDED
     hollow = np.zeros_like(mask) if crowded else insides(mask, 24 / factor)
     return Relief(factor, lighter, height, mask | hollow, hollow, crowded)
@@ -173,15 +187,34 @@ def threshold(height: Floats32, floor: float) -> float:
     return max(NOISE_TIMES * noise, floor)
 
 
-def fibre_like(height: Floats32, level: float) -> float:
-    """Return how much of what stands out is long and narrow, by length times contrast."""
+def ground_around(small: Floats32, covered: list[npt.NDArray[np.bool_]]) -> Floats32:
+    """Return the ground where nothing stands out, carried on below what does; nan far from any."""
+    free = (~(covered[0] | covered[1])).astype(np.float32)
+    size = [side // GROUND_PART | 1 for side in small.shape[::-1]]
+    share = cv2.blur(free, size)
+    found = cv2.blur(small * free, size) / np.maximum(share, LEAST_GROUND)
+    return np.where(share < LEAST_GROUND, np.float32(np.nan), found).astype(np.float32)
+
+
+def off(small: Floats32, ground: Floats32, height: Floats32, *, lighter: bool) -> Floats32:
+    """Return by how much something really is lighter or darker than the ground elsewhere.
+
+    Ground between dark fibres that lie near each other is long and narrow, and lighter than these,
+    but no lighter than other ground. Where no ground is seen the height counts.
+    """
+    away = (small - ground) if lighter else (ground - small)
+    return np.asarray(np.maximum(np.fmin(height, away), 0.0), dtype=np.float32)
+
+
+def fibre_like(height: Floats32, level: float, strength: Floats32) -> float:
+    """Return how much of what stands out is long and narrow, by length times strength."""
     mask = (height > level).astype(np.uint8)
     pieces = Pieces.of(mask)
     if not len(pieces.areas):
         return 0.0
     thickness = np.maximum(2.0 * pieces.deepest(mask) - 1.0, 1.0)
     slender = np.maximum(pieces.areas / thickness - 4.0 * thickness - 4.0, 0.0)
-    contrast = np.add.reduceat(height.ravel()[pieces.order], pieces.firsts) / pieces.areas
+    contrast = np.add.reduceat(strength.ravel()[pieces.order], pieces.firsts) / pieces.areas
     return float((slender * contrast).sum())
 
 
