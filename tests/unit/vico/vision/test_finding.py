@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from typing import Any
 
 import cv2
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.vico.api import Fibre, fibre_mask, find_fibres
+from cosmic.vico.core.vision import refine
 from cosmic.vico.core.vision.smoothing import UndeterminedError, smooth
 from unit.vico.vision.drawn_fibres import arc, drawn_image, loop
 
@@ -89,6 +91,16 @@ def test_fibres_side_by_side_are_found_and_not_the_ground_between_them(
     fibres = certain(255 - image if lighter else image)
     assert len(fibres) == count
     assert [each.width_px for each in fibres] == pytest.approx([7.0] * count, abs=0.4)
+
+
+def test_a_course_that_runs_away_costs_no_other_fibre(monkeypatch: pytest.MonkeyPatch) -> None:
+    def badly(line: np.ndarray, *others: Any) -> np.ndarray:
+        # As in the middle of ground that is cut into blocks.
+        return 1e4 * line if line[:, 1].max() < 240.0 else smooth(line, *others)
+
+    monkeypatch.setattr(refine, "smooth", badly)
+    lines = [arc((80.0, y), 0.0, 400.0, 0.1) for y in (150.0, 330.0)]
+    assert len(certain(drawn_image(lines, [7.0, 7.0]))) == 1
 
 
 def test_a_fibre_that_crosses_itself_is_followed_through() -> None:

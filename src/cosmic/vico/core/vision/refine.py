@@ -21,6 +21,8 @@ from cosmic.vico.core.vision.profiles import (
 from cosmic.vico.core.vision.smoothing import UndeterminedError, arc_lengths, resampled, smooth
 
 STEP_PX = 2.0
+# So far beyond the border a line may be smoothed.
+STRAY_PX = 30.0
 ROUNDS = 2
 
 
@@ -106,12 +108,14 @@ def refine(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | Non
 def _refined(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | None:
     width = max(2.0, (2.0 * strand.half_width - 0.5) * scene.factor)
     line = first_line(scene, strand, max(3.0 * width, 6.0 * scene.factor))
-    if len(line) < 6:
+    if len(line) < 6 or not stays(scene, line, width):
         return None
     course = Course(
         line, width, np.ones(len(line), bool), np.full(len(line), width), np.ones(len(line)), []
     )
     centre_roughly(scene, course, neighbours)
+    if not stays(scene, course.line, course.width):
+        return None
     for number in range(ROUNDS):
         if not measure(scene, course, neighbours):
             return None
@@ -202,7 +206,13 @@ def measure(scene: Scene, course: Course, neighbours: Neighbours) -> bool:
     offset = np.where(good, 0.5 * (edges.left + edges.right), 0.0)
     wave = max(20.0, 2.0 * course.width) * (1.0 + 4.0 * min(ratio, 1.0))
     move(course, profiles, offset, weights, wave)
-    return True
+    return stays(scene, course.line, course.width)
+
+
+def stays(scene: Scene, line: Floats, width: float) -> bool:
+    """Return whether a line that was smoothed is still on the image: a bad start sends it away."""
+    room = width + STRAY_PX
+    return bool((line > -room).all() and (line < scene.corner + room).all())
 
 
 def near_ends(course: Course) -> Flags:
