@@ -23,6 +23,11 @@ BLOCK_PX = 8
 FEWEST_BLOCKS = 8
 MOST_LINES = 120
 LEAST_DIFFERENCE = 0.02
+# Of a hollow fibre: its inside, and it with its walls.
+HOLLOW_PX = 24
+WIDEST_HOLLOW_PX = 48
+# Of what stands out: what is less between several is the ground.
+GROUND_SHARE = 0.12
 # What the ground is like around something: how wide that is, and how much of it must be ground.
 GROUND_PART = 4
 LEAST_GROUND = 0.05
@@ -139,7 +144,10 @@ def find_relief(image: Pixels) -> Relief:
     chosen = 1 if within else 0
     (_, lighter, height, _), mask = found[chosen], masks[chosen]
     crowded = float(mask.mean()) > CROWDED
-    hollow = np.zeros_like(mask) if crowded else insides(mask, 24 / factor)
+    hollow = np.zeros_like(mask) if crowded else insides(mask, HOLLOW_PX / factor)
+    if hollow.any():
+        away = (small - ground) if lighter else (ground - small)
+        hollow = hollow & ~between(mask, hollow, np.nan_to_num(away, nan=np.inf), factor)
     return Relief(factor, lighter, height, mask | hollow, hollow, crowded)
 
 
@@ -236,14 +244,19 @@ def thresholded(height: Floats32, level: float) -> Mask:
     if not len(pieces.areas):
         return mask
     values = height.ravel()[pieces.order]
-    number = np.repeat(np.arange(len(pieces.areas)), pieces.areas)
-    ranked = values[np.lexsort((values, number))]
-    typical = ranked[pieces.firsts + (3 * pieces.areas) // 4]
+    typical = ranked(pieces, height)[pieces.firsts + (3 * pieces.areas) // 4]
     strongest = cv2.dilate(height, np.ones((11, 11), np.uint8)).ravel()[pieces.order]
     asked = np.clip(0.4 * strongest, level, 0.55 * np.repeat(typical, pieces.areas))
     found = np.zeros(mask.size, np.uint8)
     found[pieces.order[values > asked]] = 1
     return found.reshape(mask.shape)
+
+
+def ranked(pieces: Pieces, height: Floats32) -> Floats32:
+    """Return the values of each piece from its lowest to its highest, piece after piece."""
+    values = height.ravel()[pieces.order]
+    number = np.repeat(np.arange(len(pieces.areas)), pieces.areas)
+    return np.asarray(values[np.lexsort((values, number))])
 
 
 def insides(mask: Mask, widest: float) -> Mask:
@@ -261,4 +274,24 @@ def insides(mask: Mask, widest: float) -> Mask:
         thickness = np.maximum(2.0 * pieces.deepest(gaps) - 1.0, 1.0)
         long = (pieces.areas > 10.0 * thickness**2) & (pieces.areas > 20)
         found[pieces.order[np.repeat(long, pieces.areas)]] = 1
+    return found.reshape(mask.shape)
+
+
+def between(mask: Mask, hollow: Mask, away: Floats32, factor: int) -> Mask:
+    """Return the gaps that are ground between fibres of a row, and not the inside of one.
+
+    Parameters
+    ----------
+    away : ndarray, shape of the masks
+        By how much each place differs from the ground, as what stands out does.
+    """
+    row = cv2.morphologyEx(mask | hollow, cv2.MORPH_OPEN, kernel(WIDEST_HOLLOW_PX // factor))
+    found = np.zeros(mask.size, np.uint8)
+    pieces = Pieces.of(hollow)
+    typical = away[(mask > 0) & (row > 0)]
+    if typical.size:
+        levels = ranked(pieces, away)[pieces.firsts + pieces.areas // 4]  # not that of the edges
+        wide = np.maximum.reduceat(row.ravel()[pieces.order], pieces.firsts) > 0
+        ground = wide & (levels < GROUND_SHARE * float(np.median(typical)))
+        found[pieces.order[np.repeat(ground, pieces.areas)]] = 1
     return found.reshape(mask.shape)
