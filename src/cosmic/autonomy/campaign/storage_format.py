@@ -283,7 +283,7 @@ def fibre_record(row: Row, spans: Sequence[Row], operations: Sequence[Row]) -> F
         ended_s=number(row["ended_s"]),
         found=_pose(row, "found"),
         left=_pose(row, "left"),
-        shape=Shape(**{name: number(row[name]) for name in SHAPE_NUMBERS}),
+        shape=Shape(**{name: number(row.get(name)) for name in SHAPE_NUMBERS}),
         cause=str(row["cause"]),
         text=str(row["text"]),
         attempts=int(row["attempts"] or 0),
