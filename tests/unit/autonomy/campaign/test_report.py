@@ -9,7 +9,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from cosmic.autonomy.campaign.records import CalibrationNote, CampaignError, Outcome
+from cosmic.autonomy.campaign.formatting import length_words
+from cosmic.autonomy.campaign.records import CalibrationNote, CampaignError, Outcome, Shape
 from cosmic.autonomy.campaign.report import write_report
 from cosmic.autonomy.campaign.report_table import COLUMNS, read_campaign, write_table
 from cosmic.autonomy.campaign.store import CampaignStore
@@ -199,3 +200,25 @@ def test_the_written_table_is_read_back_the_same(folder: Path, tmp_path: Path) -
 )
 def test_ticks_are_round_values(axis: Axis, ticks: list[float]) -> None:
     assert axis.ticks() == pytest.approx(ticks)
+
+
+@pytest.mark.parametrize(
+    ("probability", "words"),
+    [
+        (math.nan, ""),
+        (0.9992, ""),
+        (0.9986, " (a whole fibre: 99.8 %)"),
+        (0.6, "(a whole fibre: 60 %)"),
+    ],
+)
+def test_a_length_that_may_be_that_of_a_part_says_so(probability: float, words: str):
+    text = length_words(Shape(1200.0, 2.0, probability=probability))
+    assert text.startswith("1200 ± 4 µm")
+    assert text.endswith(words or "µm")
+
+
+def test_the_table_keeps_how_probable_it_is_that_a_fibre_is_whole(tmp_path: Path):
+    with CampaignStore.create(tmp_path / "some", INFO) as store:
+        record = good(store.begin_fibre(time_s=0.0))
+        store.finish_fibre(replace(record, shape=replace(record.shape, probability=0.75)))
+    assert read_campaign(tmp_path / "some")["probability"] == [0.75]

@@ -91,7 +91,7 @@ def test_a_campaign_of_an_earlier_program_is_resumed_without_a_budget(tmp_path: 
     with CampaignStore.create(tmp_path / "old", INFO) as store:
         store.finish_fibre(good(store.begin_fibre(time_s=0.0)))
     with sqlite3.connect(tmp_path / "old" / "campaign.sqlite") as connection:
-        for column in ("budget_json", "scale_verified", "notes"):
+        for column in ("budget_json", "scale_verified", "notes", "probability"):
             connection.execute(f"ALTER TABLE fibre DROP COLUMN {column}")
     connection.close()
     before = CampaignReader(tmp_path / "old").finished()[0].bending

@@ -82,7 +82,9 @@ def test_ground_between_two_fibres_is_no_hollow(apart: float) -> None:
 
 
 @pytest.mark.parametrize("lighter", [False, True], ids=["darker", "lighter"])
-@pytest.mark.parametrize(("apart", "count"), [(40.0, 8), (50.0, 4), (60.0, 12)])
+@pytest.mark.parametrize(
+    ("apart", "count"), [(25.0, 12), (30.0, 12), (40.0, 8), (50.0, 4), (60.0, 12)]
+)
 def test_fibres_side_by_side_are_found_and_not_the_ground_between_them(
     apart: float, count: int, lighter: bool
 ) -> None:
