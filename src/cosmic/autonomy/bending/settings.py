@@ -53,7 +53,8 @@ class FitSettings(StrictModel):
         of that.
     shear_part, shear_std_part : float
         What shear adds to the compliance of a span, over the square of the fibre's width by that of
-        the span: 0.3 times E/G for a rectangular section. A campaign learns it.
+        the span: 0.3 times E/G for a rectangular section as thick as it looks, less for a thinner
+        one. A campaign learns it.
     shear_own_part : float
         By how much that differs between fibres, as a part of it: sections are no rectangles.
     ei_length_um : float
@@ -90,8 +91,8 @@ class FitSettings(StrictModel):
     relaxation_std_part: float = Field(0.03, ge=0.0)
     side_un_um: float = Field(10.0, gt=0.0)
     side_std_part: float = Field(0.5, ge=0.0)
-    shear_part: float = Field(4.0, ge=0.0)
-    shear_std_part: float = Field(2.0, ge=0.0)
+    shear_part: float = Field(3.0, ge=0.0)
+    shear_std_part: float = Field(3.0, ge=0.0)
     shear_own_part: float = Field(0.4, ge=0.0)
     ei_length_um: float = Field(150.0, gt=0.0)
     reversal_um: float = Field(0.3, ge=0.0)
