@@ -28,9 +28,9 @@ HOLLOW_PX = 24
 WIDEST_HOLLOW_PX = 48
 # Of what stands out: what is less between several is the ground.
 GROUND_SHARE = 0.12
-# What the ground is like around something: how wide that is, and how much of it must be ground.
-GROUND_PART = 4
-LEAST_GROUND = 0.05
+# What the ground is like around something: of the image, how wide that is, and how much of it must
+# be ground.
+GROUND_PARTS = ((16, 0.3), (8, 0.3), (4, 0.05))
 # Walls are as much like fibres as what they enclose, or nearly.
 LEAST_WALLS = 0.1
 # A network fills the image, a fibre does not.
@@ -196,12 +196,20 @@ def threshold(height: Floats32, floor: float) -> float:
 
 
 def ground_around(small: Floats32, covered: list[npt.NDArray[np.bool_]]) -> Floats32:
-    """Return the ground where nothing stands out, carried on below what does; nan far from any."""
+    """Return the ground where nothing stands out, carried on below what does; nan far from any.
+
+    As near as enough of it is seen, and again of what the first time has left, so that light that
+    falls off to the sides is followed.
+    """
     free = (~(covered[0] | covered[1])).astype(np.float32)
-    size = [side // GROUND_PART | 1 for side in small.shape[::-1]]
-    share = cv2.blur(free, size)
-    found = cv2.blur(small * free, size) / np.maximum(share, LEAST_GROUND)
-    return np.where(share < LEAST_GROUND, np.float32(np.nan), found).astype(np.float32)
+    ground = np.full(small.shape, np.nan, np.float32)
+    for part, least in GROUND_PARTS:
+        size = [side // part | 1 for side in small.shape[::-1]]
+        share = np.maximum(cv2.blur(free, size), 1e-6)
+        near = cv2.blur(small * free, size) / share
+        near += cv2.blur((small - near) * free, size) / share
+        ground = np.where(np.isnan(ground) & (share >= least), near, ground).astype(np.float32)
+    return ground
 
 
 def off(small: Floats32, ground: Floats32, height: Floats32, *, lighter: bool) -> Floats32:
