@@ -95,6 +95,17 @@ def test_fibres_side_by_side_are_found_and_not_the_ground_between_them(
     assert [each.width_px for each in fibres] == pytest.approx([7.0] * count, abs=0.4)
 
 
+@pytest.mark.parametrize("contrast", [-30.0, -60.0])
+def test_fibres_side_by_side_are_found_where_light_falls_off_to_a_third(contrast: float) -> None:
+    shape = (900, 1200)
+    lines = [arc((425.0 + 50.0 * each, 300.0), 1.5, 300.0, 0.15) for each in range(8)]
+    even = drawn_image(lines, [7.0] * 8, shape=shape, noise=0.0, contrast=contrast, ground=200.0)
+    y, x = np.mgrid[: shape[0], : shape[1]] / 1200.0
+    light = 0.25 + 0.75 * np.exp(-((x - 0.5) ** 2 + (y - 0.375) ** 2) / (2.0 * 0.4**2))
+    seen = even * light + np.random.default_rng(1).normal(0.0, 1.5, shape)
+    assert len(certain(np.clip(np.round(seen), 0, 255).astype(np.uint8))) == 8
+
+
 def test_a_course_that_runs_away_costs_no_other_fibre(monkeypatch: pytest.MonkeyPatch) -> None:
     def badly(line: np.ndarray, *others: Any) -> np.ndarray:
         # As in the middle of ground that is cut into blocks.

@@ -31,8 +31,8 @@ GROUND_SHARE = 0.12
 # What the ground is like around something: of the image, how wide that is, and how much of it must
 # be ground.
 GROUND_PARTS = ((16, 0.3), (8, 0.3), (4, 0.05))
-# Walls are as much like fibres as what they enclose, or nearly.
-LEAST_WALLS = 0.1
+# Of its height: by so much something differs from the ground elsewhere that is no ground itself.
+NO_GROUND = 0.6
 # A network fills the image, a fibre does not.
 CROWDED = 0.25
 
@@ -90,6 +90,11 @@ class Pieces:
         firsts = np.concatenate([[0], np.cumsum(areas)[:-1]]) if len(areas) else areas
         return cls(order, firsts.astype(np.intp), areas)
 
+    def means(self, values: Floats32) -> Floats32:
+        """Return the mean over each piece."""
+        sums = np.add.reduceat(values.ravel()[self.order], self.firsts)
+        return np.asarray(sums / self.areas, dtype=np.float32)
+
     def deepest(self, mask: Mask) -> Floats32:
         """Return the largest distance to the outside in each piece."""
         framed = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
@@ -133,16 +138,15 @@ def find_relief(image: Pixels) -> Relief:
     ground = ground_around(
         small, [height > level for (_, height), level in zip(hats, levels, strict=True)]
     )
-    found = [
-        (fibre_like(height, level, off(small, ground, height, lighter=lighter)), *which, level)
-        for which, level in zip(hats, levels, strict=True)
-        for lighter, height in [which]
-    ]
+    found = []
+    for (lighter, height), level in zip(hats, levels, strict=True):
+        strength = off(small, ground, height, lighter=lighter)
+        found.append((*fibre_like(height, level, strength), lighter, height, level))
     found.sort(key=lambda each: -each[0])
-    masks = [thresholded(height, level) for _, _, height, level in found]
-    within = found[1][0] > LEAST_WALLS * found[0][0] and lined(masks[0], masks[1])
-    chosen = 1 if within else 0
-    (_, lighter, height, _), mask = found[chosen], masks[chosen]
+    masks = [thresholded(height, level) for *_, height, level in found]
+    within = found[1][1] > NO_GROUND and lined(masks[0], masks[1])
+    _, _, lighter, height, _ = found[1 if within else 0]
+    mask = masks[1 if within else 0]
     crowded = float(mask.mean()) > CROWDED
     hollow = np.zeros_like(mask) if crowded else insides(mask, HOLLOW_PX / factor)
     if hollow.any():
@@ -222,16 +226,19 @@ def off(small: Floats32, ground: Floats32, height: Floats32, *, lighter: bool) -
     return np.asarray(np.maximum(np.fmin(height, away), 0.0), dtype=np.float32)
 
 
-def fibre_like(height: Floats32, level: float, strength: Floats32) -> float:
-    """Return how much of what stands out is long and narrow, by length times strength."""
+def fibre_like(height: Floats32, level: float, strength: Floats32) -> tuple[float, float]:
+    """Return how much of what stands out is long and narrow, and what part of it is no ground.
+
+    That is by length times strength; the part is of length times height.
+    """
     mask = (height > level).astype(np.uint8)
     pieces = Pieces.of(mask)
     if not len(pieces.areas):
-        return 0.0
+        return 0.0, 0.0
     thickness = np.maximum(2.0 * pieces.deepest(mask) - 1.0, 1.0)
     slender = np.maximum(pieces.areas / thickness - 4.0 * thickness - 4.0, 0.0)
-    contrast = np.add.reduceat(strength.ravel()[pieces.order], pieces.firsts) / pieces.areas
-    return float((slender * contrast).sum())
+    strong, high = (float((slender * pieces.means(values)).sum()) for values in (strength, height))
+    return strong, strong / high if high else 0.0
 
 
 def lined(mask: Mask, other: Mask) -> bool:
