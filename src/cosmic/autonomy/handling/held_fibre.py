@@ -1,6 +1,5 @@
 """`HeldFibre`: the fibre that is being handled, as it becomes known."""
 
-import math
 from dataclasses import dataclass, field
 
 from cosmic.autonomy.bending.fit import MeasuredFibre
@@ -118,8 +117,10 @@ class HeldFibre:
 
     @property
     def probability(self) -> float:
-        """Of one whole fibre, as it was seen; nan where nobody knows."""
-        return self.seen.fibre.probability if self.seen is not None else math.nan
+        """Of one whole fibre, as it was seen; nan where that was certain in the survey alone."""
+        if self.seen is not None:
+            return self.seen.fibre.probability
+        return self.reach.candidate.probability
 
     @property
     def width_std_um(self) -> float:

@@ -41,6 +41,8 @@ class Candidate:
         Why it is not taken; empty when it may be.
     doubted : bool
         It is not certain that it is one whole fibre.
+    probability : float
+        Of one whole fibre, where that is doubted and it is taken; nan elsewhere.
     """
 
     line_um: Floats
@@ -53,6 +55,7 @@ class Candidate:
     width_std_um: float = math.nan
     curl_std: float = math.nan
     doubted: bool = False
+    probability: float = math.nan
 
     def moved(self, line_um: Floats) -> "Candidate":
         """Return the same fibre on another line."""

@@ -101,10 +101,11 @@ class GraspSettings(StrictModel):
     curliest : float
         Largest curl of fibres that are taken: length over projected length, less one.
     least_probability : float
-        Of fibres that are taken though it is not certain that they are seen as a whole; those that
-        are certain come first.
+        Of fibres that are taken though it is not certain that they are seen as a whole; certain
+        ones that are as free come first.
     views : int
-        At how many angles of the table a plate is looked at before it is said that nothing is left.
+        At how many angles of the table a plate is looked at, at most, before it is said that
+        nothing is left.
     inside_um : float
         Length of fibre between the jaws.
     clear_um : float

@@ -1,5 +1,6 @@
 """Operations that look at the whole sample and choose a fibre."""
 
+import logging
 import math
 from collections import Counter
 from collections.abc import Mapping
@@ -15,8 +16,11 @@ from cosmic.autonomy.handling.prepare import clear_image
 from cosmic.autonomy.handling.settings import GraspSettings, StandardSettings
 from cosmic.autonomy.handling.sight import SeenFibre, find_seen
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
+from cosmic.frame.errors import MoveRefused, StoppedError
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats
+
+logger = logging.getLogger(__name__)
 
 CROSSING = "crossing"
 NOT_CERTAIN = "not certain"
@@ -39,6 +43,7 @@ STANDARD_CURL = 0.01
 DROPPED_LENGTH = 0.004
 DROPPED_WIDTH = 0.15
 DROPPED_CURL = 0.006
+PART_UNLIKE = 0.9
 WHOLE_OR_NOT = ("weak signs", "another piece begins", "less sharp", "goes on beyond")
 """Words of doubts that what is seen is the whole fibre: it can be held and bent all the same."""
 VIEW_DEG = 70.0
@@ -60,21 +65,31 @@ class Survey(FibreOperation):
         if work.shared.surveyed and work.shared.candidates and not due:
             return
         yield from clear_image(work)
-        yield from self._look(work)
+        before = work.shared.lines_um
+        yield from self._look(work, before)
+        reasons = Counter(work.shared.skip_reasons)
         for angle in views_deg(work.table_deg, work.settings.grasp):
-            if can_be_taken(work) or ANOTHER_VIEW.isdisjoint(work.shared.skip_reasons):
+            if can_be_taken(work) or ANOTHER_VIEW.isdisjoint(reasons):
                 break
-            yield work.go({work.table: angle})
-            yield from self._look(work)
+            try:
+                yield work.go({work.table: angle})
+            except MoveRefused as refusal:
+                if isinstance(refusal, StoppedError):
+                    raise
+                logger.warning("the plate is not looked at from another side: %s", refusal)
+                break
+            yield from self._look(work, before)
+            reasons |= work.shared.skip_reasons
         if not work.shared.candidates:
-            raise OperationFailed(NONE_LEFT, none_left(work.shared.skip_reasons))
+            work.shared.skip_reasons = reasons
+            raise OperationFailed(NONE_LEFT, none_left(reasons))
         yield SAFE_POINT
 
-    def _look(self, work: HandlingContext) -> Steps:
+    def _look(self, work: HandlingContext, before: list[Floats]) -> Steps:
         image = yield work.image()
         assert isinstance(image, CameraImage)
         mapped = work.mapped(image)
-        look(work, find_seen(image, mapped))
+        look(work, find_seen(image, mapped), before)
 
 
 def views_deg(angle_deg: float, settings: GraspSettings) -> list[float]:
@@ -104,17 +119,24 @@ def none_left(skip_reasons: Mapping[str, int]) -> str:
     return f"none on the plate can be grasped ({reasons}): spread them, or put another sample there"
 
 
-def look(work: HandlingContext, seen: list[SeenFibre]) -> None:
-    """Take note of what lies on the plate, and of what may be taken."""
+def look(work: HandlingContext, seen: list[SeenFibre], before: list[Floats] | None = None) -> None:
+    """Take note of what lies on the plate, and of what may be taken.
+
+    Parameters
+    ----------
+    before : list of ndarray, optional
+        What lay there when it was surveyed before; what was seen last, if None.
+    """
     angle, frame = work.table_deg, work.calibration.frame
     found = [_candidate(work, each, frame.on_plate(each.line_um, angle)) for each in seen]
     standard = standard_among(found, work.settings.standard)
-    before, work.shared.lines_um = work.shared.lines_um, [each.line_um for each in found]
+    before = work.shared.lines_um if before is None else before
+    work.shared.lines_um = [each.line_um for each in found]
     work.shared.standard = None
     if standard is not None and not (standard.problem or _crowded(work, standard)):
         work.shared.standard = standard
     checked = [
-        replace(each, problem=each.problem or _lonely(work, each))
+        replace(each, problem=each.problem or _of_standard(work, each) or _lonely(work, each))
         for each in found
         if each is not standard
     ]
@@ -149,6 +171,7 @@ def _leave_fallen(
 
 def _candidate(work: HandlingContext, seen: SeenFibre, line_um: Floats) -> Candidate:
     settings, doubts = work.settings.grasp, " ".join(seen.fibre.doubts)
+    tried = not seen.fibre.certain and _worth_trying(seen, settings)
     problem = ""
     if "hardly stands out" in doubts:
         problem = TOO_FAINT
@@ -156,7 +179,7 @@ def _candidate(work: HandlingContext, seen: SeenFibre, line_um: Floats) -> Candi
         problem = OUT_OF_FIELD
     elif "cross" in doubts or "branch" in doubts or "several" in doubts:
         problem = CROSSING
-    elif not seen.fibre.certain and not _worth_trying(seen, settings):
+    elif not (seen.fibre.certain or tried):
         problem = NOT_CERTAIN
     elif seen.length_um < settings.shortest_um:
         problem = TOO_SHORT
@@ -175,6 +198,7 @@ def _candidate(work: HandlingContext, seen: SeenFibre, line_um: Floats) -> Candi
         seen.width_std_um,
         seen.curl_std,
         doubted=not seen.fibre.certain,
+        probability=seen.fibre.probability if tried else math.nan,
     )
 
 
@@ -196,6 +220,15 @@ def standard_among(found: list[Candidate], settings: StandardSettings) -> Candid
         and math.dist(each.position_um, (settings.x_um, settings.y_um)) <= settings.within_um
     ]
     return found[min(fitting)[1]] if fitting else None
+
+
+def _of_standard(work: HandlingContext, candidate: Candidate) -> str:
+    """Return why something that may be a part of the standard is left where it lies."""
+    standard = work.settings.standard
+    near = math.dist(candidate.position_um, (standard.x_um, standard.y_um)) <= standard.within_um
+    straight = candidate.curl <= 2.0 * STANDARD_CURL
+    mine = standard.ei_n_m2 > 0.0 and candidate.doubted and near and straight
+    return NOT_CERTAIN if mine else ""
 
 
 def _lonely(work: HandlingContext, candidate: Candidate) -> str:
@@ -235,9 +268,12 @@ def _unlike(one: Candidate, other: HeldFibre) -> float:
     """Return how little a sighting is like a fibre that was measured; 1 and more is another."""
     if one.problem:
         return math.inf
+    width = abs(one.width_um / other.width_um - 1.0) / DROPPED_WIDTH
+    if one.doubted:  # it may be a part of it; one that is seen whole is more like it
+        return max(width, PART_UNLIKE)
     return max(
         abs(one.length_um / other.length_um - 1.0) / DROPPED_LENGTH,
-        abs(one.width_um / other.width_um - 1.0) / DROPPED_WIDTH,
+        width,
         abs(one.curl - other.curl) / DROPPED_CURL,
     )
 

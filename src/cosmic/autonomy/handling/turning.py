@@ -47,7 +47,8 @@ class FindRotationCentre(Calibrated):
         yield from clear_image(work)
         begun = work.table_deg
         nearest = sorted(
-            work.shared.candidates, key=lambda each: float(np.hypot(*each.position_um))
+            work.shared.candidates,
+            key=lambda each: (each.doubted, float(np.hypot(*each.position_um))),
         )
         why = ""
         for candidate in nearest[:MOST_FIBRES]:

@@ -429,7 +429,11 @@ class FibreHandling:
         with self._state.lock:
             if gripper not in self._state.contexts:
                 other = next((each for each in self.grippers if each != gripper), "")
-                settings = self._settings.model_copy(update={"gripper": gripper, "other": other})
+                # A person pointed at a fibre: the table turns for that one alone.
+                grasp = self._settings.grasp.model_copy(update={"views": 1})
+                settings = self._settings.model_copy(
+                    update={"gripper": gripper, "other": other, "grasp": grasp}
+                )
                 work = HandlingContext.on(self._rig, settings)
                 if self._state.contexts:  # fibres are numbered through
                     work.shared = next(iter(self._state.contexts.values())).shared

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from typing_extensions import override
 
+from cosmic.autonomy.campaign.recorder import record_of
 from cosmic.autonomy.handling import survey
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.plate import Jaws
@@ -15,6 +16,8 @@ from cosmic.autonomy.handling.settings import HandlingSettings, StandardSettings
 from cosmic.autonomy.handling.survey import Choose, look
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.frame.clock import ManualClock
+from cosmic.frame.errors import MoveRefused
+from cosmic.frame.verdict import MoveVerdict, Reason
 from cosmic.vico.core.vision.beyond import GOES_ON, SOFT
 from cosmic.vico.core.vision.certainty import IMPROBABLE
 from cosmic.vico.core.vision.checks import CONTINUES, PARTED
@@ -122,6 +125,29 @@ def test_a_certain_fibre_is_taken_before_one_that_is_doubted():
             pass
         taken.append(bench.held_fibre().reach.candidate.doubted)
     assert taken == [False, True]
+    record = record_of(
+        bench.held_fibre(), 1, ended_s=1.0, measures=False, images=False, events=(), series=()
+    )
+    assert record.shape.probability == 0.9
+    assert record.shape.doubted
+
+
+def test_what_may_be_a_part_of_the_standard_stays_where_it_is():
+    bench = Bench()
+    bench.settings = HandlingSettings(standard=StandardSettings(ei_n_m2=1.79e-10))
+    part = Seen(0.0, -3800.0, length_um=1850.0, curl=0.001, doubts=(SOFT,), probability=0.9)
+    look(bench, [part])  # type: ignore[list-item]
+    assert bench.shared.skip_reasons == {survey.NOT_CERTAIN: 1}
+
+
+def test_a_part_of_one_that_was_measured_and_fell_is_not_measured_again():
+    bench = looked(Seen(0.0, 0.0))
+    for _ in Choose().run(bench):
+        pass
+    bench.shared.dropped.append(bench.held_fibre())
+    part = Seen(-1500.0, 0.0, length_um=1100.0, doubts=(CONTINUES,), probability=0.9)
+    look(bench, [part])  # type: ignore[list-item]
+    assert bench.shared.skip_reasons == {survey.MEASURED: 1}
 
 
 class Turning(Bench):
@@ -129,7 +155,9 @@ class Turning(Bench):
 
     def __init__(self, *views: list[Seen]) -> None:
         super().__init__()
-        self.angle_deg, self.views, self.seen_at = 10.0, list(views), []
+        self.angle_deg, self.views = 10.0, list(views)
+        self.seen_at: list[float] = []
+        self.refusal: MoveRefused | None = None
 
     @property
     @override
@@ -151,6 +179,8 @@ class Turning(Bench):
 
     @override
     def go(self, targets: Any) -> Any:
+        if self.refusal is not None:
+            raise self.refusal
         return targets
 
     def look_at_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -181,11 +211,22 @@ UNSURE = Seen(0.0, 0.0, doubts=(PARTED,))
 def test_where_nothing_can_be_taken_the_plate_is_looked_at_from_other_sides(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    bench = Turning([UNSURE], [Seen(0.0, 0.0)])
+    bench = Turning([UNSURE], [], [Seen(0.0, 0.0)])
     bench.look_at_it(monkeypatch)
-    assert bench.seen_at == [10.0, 80.0]
+    assert bench.seen_at == [10.0, 80.0, -60.0]
     assert len(bench.shared.candidates) == 1
-    assert bench.shared.survey_deg == 80.0
+    assert bench.shared.survey_deg == -60.0
+
+
+def test_a_plate_that_may_not_be_turned_has_nothing_left(monkeypatch: pytest.MonkeyPatch):
+    bench = Turning([UNSURE])
+    bench.refusal = MoveRefused(
+        MoveVerdict(allowed=False, reason=Reason.COLLISION, text="a jaw is in the way")
+    )
+    with pytest.raises(OperationFailed) as failed:
+        bench.look_at_it(monkeypatch)
+    assert failed.value.cause == survey.NONE_LEFT
+    assert "1 not certain" in str(failed.value)
 
 
 @pytest.mark.parametrize(

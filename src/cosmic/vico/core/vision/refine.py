@@ -108,13 +108,12 @@ def refine(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | Non
 def _refined(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | None:
     width = max(2.0, (2.0 * strand.half_width - 0.5) * scene.factor)
     line = first_line(scene, strand, max(3.0 * width, 6.0 * scene.factor))
-    if len(line) < 6 or not stays(scene, line, width):
+    if len(line) < 6:
         return None
     course = Course(
         line, width, np.ones(len(line), bool), np.full(len(line), width), np.ones(len(line)), []
     )
-    centre_roughly(scene, course, neighbours)
-    if not stays(scene, course.line, course.width):
+    if not centre_roughly(scene, course, neighbours):
         return None
     for number in range(ROUNDS):
         if not measure(scene, course, neighbours):
@@ -137,7 +136,9 @@ def first_line(scene: Scene, strand: Strand, wave_px: float) -> Floats:
     weights = np.where(gap > 3.0 * scene.factor, 0.0, 1.0)
     if (weights > 0).sum() < 6:
         return line[:0]
-    return resampled(smooth(line, weights, wave_px / STEP_PX), STEP_PX)
+    line = smooth(line, weights, wave_px / STEP_PX)
+    width = 2.0 * strand.half_width * scene.factor
+    return resampled(line, STEP_PX) if stays(scene, line, width) else line[:0]
 
 
 def excluded(course: Course, neighbours: Neighbours) -> Flags:
@@ -153,15 +154,21 @@ def excluded(course: Course, neighbours: Neighbours) -> Flags:
     return near
 
 
-def centre_roughly(scene: Scene, course: Course, neighbours: Neighbours) -> None:
-    """Move a line onto its fibre, from where the skeleton of the reduced image lies."""
+def centre_roughly(scene: Scene, course: Course, neighbours: Neighbours) -> bool:
+    """Move a line onto its fibre, from where the skeleton of the reduced image lies.
+
+    False where it did not stay on the image.
+    """
     reach = 1.1 * course.width + 2 * scene.factor + 4
     profiles = cross_sections(scene, course.line, course.width, reach)
     most = scene.factor + 0.35 * course.width
     offset = box_centres(profiles, along(profiles, 2.0), course.width, most)
     weights = np.where(excluded(course, neighbours), 0.0, 1.0)
     move(course, profiles, offset, weights, max(24.0, 3.0 * course.width))
+    if not stays(scene, course.line, course.width):
+        return False
     course.line = resampled(course.line, STEP_PX)
+    return True
 
 
 def move(

@@ -303,7 +303,7 @@ def between(mask: Mask, hollow: Mask, away: Floats32, factor: int) -> Mask:
     row = cv2.morphologyEx(mask | hollow, cv2.MORPH_OPEN, kernel(WIDEST_HOLLOW_PX // factor))
     found = np.zeros(mask.size, np.uint8)
     pieces = Pieces.of(hollow)
-    typical = away[(mask > 0) & (row > 0)]
+    typical = away[(mask > 0) & (row > 0) & np.isfinite(away)]
     if typical.size:
         levels = ranked(pieces, away)[pieces.firsts + pieces.areas // 4]  # not that of the edges
         wide = np.maximum.reduceat(row.ravel()[pieces.order], pieces.firsts) > 0
