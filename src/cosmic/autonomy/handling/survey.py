@@ -3,7 +3,7 @@
 import logging
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -47,8 +47,10 @@ PART_UNLIKE = 0.9
 WHOLE_OR_NOT = ("weak signs", "another piece begins", "less sharp", "goes on beyond")
 """Words of doubts that what is seen is the whole fibre: it can be held and bent all the same."""
 VIEW_DEG = 70.0
-ANOTHER_VIEW = frozenset({NOT_CERTAIN, CROSSING, OUT_OF_FIELD})
+ANOTHER_VIEW = frozenset({NOT_CERTAIN, OUT_OF_FIELD})
 """Problems that an image of the plate at another angle may not have."""
+LYING_TOGETHER = frozenset({CROSSING, TOO_NEAR})
+"""Problems that stay: where one image does not show the other fibre, it lies there all the same."""
 
 
 class Survey(FibreOperation):
@@ -65,7 +67,7 @@ class Survey(FibreOperation):
         if work.shared.surveyed and work.shared.candidates and not due:
             return
         yield from clear_image(work)
-        before = work.shared.lines_um
+        before, together = work.shared.lines_um, list[Candidate]()
         yield from self._look(work, before)
         reasons = Counter(work.shared.skip_reasons)
         for angle in views_deg(work.table_deg, work.settings.grasp):
@@ -78,18 +80,21 @@ class Survey(FibreOperation):
                     raise
                 logger.warning("the plate is not looked at from another side: %s", refusal)
                 break
-            yield from self._look(work, before)
+            together += [each for each in work.shared.unsuitable if each.problem in LYING_TOGETHER]
+            yield from self._look(work, before, together)
             reasons |= work.shared.skip_reasons
         if not work.shared.candidates:
             work.shared.skip_reasons = reasons
             raise OperationFailed(NONE_LEFT, none_left(reasons))
         yield SAFE_POINT
 
-    def _look(self, work: HandlingContext, before: list[Floats]) -> Steps:
+    def _look(
+        self, work: HandlingContext, before: list[Floats], together: Sequence[Candidate] = ()
+    ) -> Steps:
         image = yield work.image()
         assert isinstance(image, CameraImage)
         mapped = work.mapped(image)
-        look(work, find_seen(image, mapped), before)
+        look(work, find_seen(image, mapped), before, together)
 
 
 def views_deg(angle_deg: float, settings: GraspSettings) -> list[float]:
@@ -119,13 +124,20 @@ def none_left(skip_reasons: Mapping[str, int]) -> str:
     return f"none on the plate can be grasped ({reasons}): spread them, or put another sample there"
 
 
-def look(work: HandlingContext, seen: list[SeenFibre], before: list[Floats] | None = None) -> None:
+def look(
+    work: HandlingContext,
+    seen: list[SeenFibre],
+    before: list[Floats] | None = None,
+    together: Sequence[Candidate] = (),
+) -> None:
     """Take note of what lies on the plate, and of what may be taken.
 
     Parameters
     ----------
     before : list of ndarray, optional
         What lay there when it was surveyed before; what was seen last, if None.
+    together : sequence of Candidate
+        Those that were seen to lie with others, from another side.
     """
     angle, frame = work.table_deg, work.calibration.frame
     found = [_candidate(work, each, frame.on_plate(each.line_um, angle)) for each in seen]
@@ -136,7 +148,13 @@ def look(work: HandlingContext, seen: list[SeenFibre], before: list[Floats] | No
     if standard is not None and not (standard.problem or _crowded(work, standard)):
         work.shared.standard = standard
     checked = [
-        replace(each, problem=each.problem or _of_standard(work, each) or _lonely(work, each))
+        replace(
+            each,
+            problem=each.problem
+            or _of_standard(work, each)
+            or _lonely(work, each)
+            or next((other.problem for other in together if same_fibre(each, other)), ""),
+        )
         for each in found
         if each is not standard
     ]

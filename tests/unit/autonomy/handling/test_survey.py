@@ -11,7 +11,7 @@ from typing_extensions import override
 from cosmic.autonomy.campaign.recorder import record_of
 from cosmic.autonomy.handling import survey
 from cosmic.autonomy.handling.context import HandlingContext
-from cosmic.autonomy.handling.plate import Jaws
+from cosmic.autonomy.handling.plate import Jaws, PlateFrame
 from cosmic.autonomy.handling.settings import HandlingSettings, StandardSettings
 from cosmic.autonomy.handling.survey import Choose, look
 from cosmic.autonomy.procedures.operation import OperationFailed
@@ -216,6 +216,20 @@ def test_where_nothing_can_be_taken_the_plate_is_looked_at_from_other_sides(
     assert bench.seen_at == [10.0, 80.0, -60.0]
     assert len(bench.shared.candidates) == 1
     assert bench.shared.survey_deg == -60.0
+
+
+def test_what_crosses_another_is_left_from_whichever_side_that_was_seen(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    crossing = Seen(2000.0, 500.0, doubts=("a crossing can be read in two ways",))
+    alone = Seen(2000.0, 500.0, doubts=(IMPROBABLE,), probability=0.99)
+    plate = PlateFrame()
+    alone.line_um = plate.on_platform(plate.on_plate(crossing.line_um, 10.0), 80.0)
+    bench = Turning([UNSURE, crossing], [UNSURE, alone], [UNSURE])
+    with pytest.raises(OperationFailed) as failed:
+        bench.look_at_it(monkeypatch)
+    assert failed.value.cause == survey.NONE_LEFT
+    assert "1 crossing" in str(failed.value)
 
 
 def test_a_plate_that_may_not_be_turned_has_nothing_left(monkeypatch: pytest.MonkeyPatch):
