@@ -82,7 +82,7 @@ class Survey(FibreOperation):
                 break
             together += [each for each in work.shared.unsuitable if each.problem in LYING_TOGETHER]
             yield from self._look(work, before, together)
-            reasons |= work.shared.skip_reasons
+            reasons |= work.shared.skip_reasons - Counter({TOO_FAINT: len(work.shared.unsuitable)})
         if not work.shared.candidates:
             work.shared.skip_reasons = reasons
             raise OperationFailed(NONE_LEFT, none_left(reasons))

@@ -232,6 +232,12 @@ def test_what_crosses_another_is_left_from_whichever_side_that_was_seen(
     assert "1 crossing" in str(failed.value)
 
 
+def test_noise_that_one_side_shows_is_no_reason(monkeypatch: pytest.MonkeyPatch):
+    bench = Turning([UNSURE], [UNSURE, Seen(2000.0, 500.0, doubts=(FAINT,))], [UNSURE])
+    with pytest.raises(OperationFailed, match=r"\(1 not certain\)"):
+        bench.look_at_it(monkeypatch)
+
+
 def test_a_plate_that_may_not_be_turned_has_nothing_left(monkeypatch: pytest.MonkeyPatch):
     bench = Turning([UNSURE])
     bench.refusal = MoveRefused(
