@@ -238,15 +238,7 @@ def record_of(
         began_s=fibre.found_s,
         ended_s=fibre.done_s or ended_s,
         found=pose_of(fibre.reach.candidate),
-        shape=Shape(
-            length_um=fibre.length_um,
-            length_std_um=fibre.length_std_um,
-            width_um=fibre.width_um,
-            width_std_um=fibre.width_std_um,
-            curl=fibre.curl,
-            curl_std=fibre.curl_std,
-            probability=fibre.probability,
-        ),
+        shape=_shape_of(fibre),
         cause=cause,
         text=text,
         attempts=max(fibre.tries, 1),
@@ -263,6 +255,18 @@ def record_of(
         series=series,
         role=STANDARD if fibre.standard else FIBRE,
         elapsed_s=elapsed_s,
+    )
+
+
+def _shape_of(fibre: HeldFibre) -> Shape:
+    return Shape(
+        length_um=fibre.length_um,
+        length_std_um=fibre.length_std_um,
+        width_um=fibre.width_um,
+        width_std_um=fibre.width_std_um,
+        curl=fibre.curl,
+        curl_std=fibre.curl_std,
+        probability=fibre.probability,
     )
 
 

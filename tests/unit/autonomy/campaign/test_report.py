@@ -10,12 +10,19 @@ import pandas as pd
 import pytest
 
 from cosmic.autonomy.campaign.formatting import length_words
-from cosmic.autonomy.campaign.records import CalibrationNote, CampaignError, Outcome, Shape
+from cosmic.autonomy.campaign.records import (
+    CERTAIN,
+    CalibrationNote,
+    CampaignError,
+    Outcome,
+    Shape,
+)
 from cosmic.autonomy.campaign.report import write_report
 from cosmic.autonomy.campaign.report_table import COLUMNS, read_campaign, write_table
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.campaign.svg_plot import Axis
+from cosmic.vico.core.vision import certainty
 from unit.autonomy.campaign.sample_records import INFO, failed, good
 
 STIFFNESSES = (3e-11, 5e-11, 9e-11)
@@ -222,3 +229,7 @@ def test_the_table_keeps_how_probable_it_is_that_a_fibre_is_whole(tmp_path: Path
         record = good(store.begin_fibre(time_s=0.0))
         store.finish_fibre(replace(record, shape=replace(record.shape, probability=0.75)))
     assert read_campaign(tmp_path / "some")["probability"] == [0.75]
+
+
+def test_records_and_vision_call_the_same_fibres_certain():
+    assert CERTAIN == certainty.CERTAIN

@@ -138,7 +138,7 @@ def first_line(scene: Scene, strand: Strand, wave_px: float) -> Floats:
         return line[:0]
     line = smooth(line, weights, wave_px / STEP_PX)
     width = 2.0 * strand.half_width * scene.factor
-    return resampled(line, STEP_PX) if stays(scene, line, width) else line[:0]
+    return resampled(line, STEP_PX) if is_on_image(scene, line, width) else line[:0]
 
 
 def excluded(course: Course, neighbours: Neighbours) -> Flags:
@@ -165,7 +165,7 @@ def centre_roughly(scene: Scene, course: Course, neighbours: Neighbours) -> bool
     offset = box_centres(profiles, along(profiles, 2.0), course.width, most)
     weights = np.where(excluded(course, neighbours), 0.0, 1.0)
     move(course, profiles, offset, weights, max(24.0, 3.0 * course.width))
-    if not stays(scene, course.line, course.width):
+    if not is_on_image(scene, course.line, course.width):
         return False
     course.line = resampled(course.line, STEP_PX)
     return True
@@ -213,10 +213,10 @@ def measure(scene: Scene, course: Course, neighbours: Neighbours) -> bool:
     offset = np.where(good, 0.5 * (edges.left + edges.right), 0.0)
     wave = max(20.0, 2.0 * course.width) * (1.0 + 4.0 * min(ratio, 1.0))
     move(course, profiles, offset, weights, wave)
-    return stays(scene, course.line, course.width)
+    return is_on_image(scene, course.line, course.width)
 
 
-def stays(scene: Scene, line: Floats, width: float) -> bool:
+def is_on_image(scene: Scene, line: Floats, width: float) -> bool:
     """Return whether a line that was smoothed is still on the image: a bad start sends it away."""
     room = width + STRAY_PX
     return bool((line > -room).all() and (line < scene.corner + room).all())

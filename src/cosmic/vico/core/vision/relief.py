@@ -140,8 +140,8 @@ def find_relief(image: Pixels) -> Relief:
     )
     found = []
     for (lighter, height), level in zip(hats, levels, strict=True):
-        strength = off(small, ground, height, lighter=lighter)
-        found.append((*fibre_like(height, level, strength), lighter, height, level))
+        away = from_ground(small, ground, lighter=lighter)
+        found.append((*fibre_like(height, level, away), lighter, height, level))
     found.sort(key=lambda each: -each[0])
     masks = [thresholded(height, level) for *_, height, level in found]
     within = found[1][1] > NO_GROUND and lined(masks[0], masks[1])
@@ -150,8 +150,8 @@ def find_relief(image: Pixels) -> Relief:
     crowded = float(mask.mean()) > CROWDED
     hollow = np.zeros_like(mask) if crowded else insides(mask, HOLLOW_PX / factor)
     if hollow.any():
-        away = (small - ground) if lighter else (ground - small)
-        hollow = hollow & ~between(mask, hollow, np.nan_to_num(away, nan=np.inf), factor)
+        away = from_ground(small, ground, lighter=lighter)
+        hollow &= ~ground_between(mask, hollow, np.nan_to_num(away, nan=np.inf), factor)
     return Relief(factor, lighter, height, mask | hollow, hollow, crowded)
 
 
@@ -216,20 +216,17 @@ def ground_around(small: Floats32, covered: list[npt.NDArray[np.bool_]]) -> Floa
     return ground
 
 
-def off(small: Floats32, ground: Floats32, height: Floats32, *, lighter: bool) -> Floats32:
-    """Return by how much something really is lighter or darker than the ground elsewhere.
-
-    Ground between dark fibres that lie near each other is long and narrow, and lighter than these,
-    but no lighter than other ground. Where no ground is seen the height counts.
-    """
-    away = (small - ground) if lighter else (ground - small)
-    return np.asarray(np.maximum(np.fmin(height, away), 0.0), dtype=np.float32)
+def from_ground(small: Floats32, ground: Floats32, *, lighter: bool) -> Floats32:
+    """Return by how much each place is lighter, or darker, than the ground elsewhere."""
+    return np.asarray(small - ground if lighter else ground - small, dtype=np.float32)
 
 
-def fibre_like(height: Floats32, level: float, strength: Floats32) -> tuple[float, float]:
+def fibre_like(height: Floats32, level: float, away: Floats32) -> tuple[float, float]:
     """Return how much of what stands out is long and narrow, and what part of it is no ground.
 
-    That is by length times strength; the part is of length times height.
+    Length counts times strength, which is the height as far as a place differs from the ground
+    elsewhere: what lies between dark fibres near each other is long and narrow, and lighter than
+    these, but no lighter than other ground. Where no ground is seen the height counts.
     """
     mask = (height > level).astype(np.uint8)
     pieces = Pieces.of(mask)
@@ -237,6 +234,7 @@ def fibre_like(height: Floats32, level: float, strength: Floats32) -> tuple[floa
         return 0.0, 0.0
     thickness = np.maximum(2.0 * pieces.deepest(mask) - 1.0, 1.0)
     slender = np.maximum(pieces.areas / thickness - 4.0 * thickness - 4.0, 0.0)
+    strength = np.maximum(np.fmin(height, away), 0.0)
     strong, high = (float((slender * pieces.means(values)).sum()) for values in (strength, height))
     return strong, strong / high if high else 0.0
 
@@ -292,7 +290,7 @@ def insides(mask: Mask, widest: float) -> Mask:
     return found.reshape(mask.shape)
 
 
-def between(mask: Mask, hollow: Mask, away: Floats32, factor: int) -> Mask:
+def ground_between(mask: Mask, hollow: Mask, away: Floats32, factor: int) -> Mask:
     """Return the gaps that are ground between fibres of a row, and not the inside of one.
 
     Parameters
