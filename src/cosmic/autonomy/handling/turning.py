@@ -1,6 +1,6 @@
 """About which point the plate turns, by a fibre that is followed from angle to angle."""
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from typing import Final
 
 import numpy as np
@@ -46,12 +46,8 @@ class FindRotationCentre(Calibrated):
             raise OperationFailed("no fibre", "no fibre on the plate is clear enough to follow")
         yield from clear_image(work)
         begun = work.table_deg
-        nearest = sorted(
-            work.shared.candidates,
-            key=lambda each: (each.doubted, float(np.hypot(*each.position_um))),
-        )
         why = ""
-        for candidate in nearest[:MOST_FIBRES]:
+        for candidate in to_follow(work.shared.candidates):
             try:
                 fit = yield from _followed(work, candidate, begun)
             except (NotAvailable, CalibrationRefused) as exc:
@@ -69,6 +65,13 @@ class FindRotationCentre(Calibrated):
     def restore(self, work: HandlingContext, entry: CalibrationEntry) -> None:
         centre_um = entry.values["centre_x_um"], entry.values["centre_y_um"]
         _put_in_force(work, PlateFrame(centre_um))
+
+
+def to_follow(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Return the fibres that are followed, one after the other: certain ones, near the centre."""
+    return sorted(candidates, key=lambda each: (each.doubted, float(np.hypot(*each.position_um))))[
+        :MOST_FIBRES
+    ]
 
 
 def _followed(
