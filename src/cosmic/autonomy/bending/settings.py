@@ -92,7 +92,7 @@ class FitSettings(StrictModel):
     side_un_um: float = Field(10.0, gt=0.0)
     side_std_part: float = Field(0.5, ge=0.0)
     shear_part: float = Field(3.0, ge=0.0)
-    shear_std_part: float = Field(2.0, ge=0.0)
+    shear_std_part: float = Field(3.0, ge=0.0)
     shear_own_part: float = Field(0.4, ge=0.0)
     ei_length_um: float = Field(150.0, gt=0.0)
     reversal_um: float = Field(0.3, ge=0.0)
