@@ -151,6 +151,13 @@ def test_shear_counts_where_spans_are_short() -> None:
     assert sheared.ei_off > PLAIN.ei_off + 0.01
 
 
+def test_a_round_fibre_shears_as_one_as_thick_as_it_looks() -> None:
+    flat = lever_fit(with_fibre(shear_ratio=12.0))
+    round_one = lever_fit(with_fibre(shear_ratio=12.0, round=True))
+    assert abs(flat.ei_off - PLAIN.ei_off) < 0.005, "8 um thick it hardly shears"
+    assert round_one.clamp_um > flat.clamp_um + 3.0
+
+
 def test_a_fibre_that_relaxes_comes_out_too_soft_and_makes_a_loop() -> None:
     slow = lever_fit(with_fibre(relaxation_per_decade=0.1))
     assert slow.ei_off - PLAIN.ei_off == pytest.approx(-0.10, abs=0.04)

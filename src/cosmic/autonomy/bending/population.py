@@ -6,6 +6,7 @@ each from spreads that are common. All of it is learned from all fibres and stan
 fibre is then assessed by what the others say.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -177,7 +178,10 @@ def _shared(
         if read.certified is not None or _teaches(of):
             own, pull = _says(read, of, weight, settings)
         said.append((own, pull))
-        total, pulled = total + own, pulled + pull
+        if read.certified is None:
+            total, pulled = total + own, pulled + pull
+    for of_one in _of_one_certificate(readings, assessed, weights, settings):
+        total, pulled = total + of_one[0], pulled + of_one[1]
 
     def solved(own: Floats, pull: Floats) -> Common:
         covariance = np.asarray(np.linalg.inv(total - own), dtype=np.float64)
@@ -204,29 +208,90 @@ def _says(
     read: Readings, assessed: Assessed, weight: Floats, settings: FitSettings
 ) -> tuple[Floats, Floats]:
     """Return what one fibre says of what is common: precision, and precision times mean."""
-    depths = assessed.evidence.depths_um
-    posterior = assessed.posterior
-    here = int(np.abs(np.log(depths / posterior.depth_um)).argmin())
-    here = min(max(here, 1), len(depths) - 2)
-    geometry = read.response.log_stiffness(depths[here - 1 : here + 2])[:, read.span]
-    step = float(np.log(depths[here + 1] / depths[here - 1]))
-    by_depth = (geometry[2] - geometry[0]) / step
-    of_depth = weight.sum(axis=1) / weight.sum()
-    logs = np.log(depths)
-    middle = float(of_depth @ logs)
-    variance = float(of_depth @ (logs - middle) ** 2)
-    whole = fixed_covariance(read) + variance * np.outer(by_depth, by_depth)
-    variation = posterior.variation
-    whole = whole + varied_covariance(read, settings)[here] * variation**2
-    away = read.log_k - own_mean(read) - geometry[1] - by_depth * (middle - logs[here])
-    ones = np.ones(len(away))
+    own = _Said.of(read, assessed, weight, settings)
     if read.certified is not None:
-        log_ei, std = read.certified
-        root = np.linalg.inv(whole + std**2)
-        away = away - log_ei
-    else:
+        return own.with_unknown(read.certified[1])
+    return own.with_unknown(math.inf)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Said:
+    """What readings say of what is common, if ln(EI) were known exactly.
+
+    Attributes
+    ----------
+    precision, pull : ndarray, shapes (8, 8) and (8,)
+        Precision, and precision times mean.
+    by_ei, ei_precision, ei_pull : ndarray, shape (8,), and float
+        The same of an error of ln(EI), and what both have to do with each other.
+    """
+
+    precision: Floats
+    pull: Floats
+    by_ei: Floats
+    ei_precision: float
+    ei_pull: float
+
+    @classmethod
+    def of(
+        cls, read: Readings, assessed: Assessed, weight: Floats, settings: FitSettings
+    ) -> "_Said":
+        """Return what one fibre says, about the depth of its clamp that is the most probable."""
+        depths = assessed.evidence.depths_um
+        posterior = assessed.posterior
+        here = int(np.abs(np.log(depths / posterior.depth_um)).argmin())
+        here = min(max(here, 1), len(depths) - 2)
+        geometry = read.response.log_stiffness(depths[here - 1 : here + 2])[:, read.span]
+        step = float(np.log(depths[here + 1] / depths[here - 1]))
+        by_depth = (geometry[2] - geometry[0]) / step
+        of_depth = weight.sum(axis=1) / weight.sum()
+        logs = np.log(depths)
+        middle = float(of_depth @ logs)
+        variance = float(of_depth @ (logs - middle) ** 2)
+        whole = fixed_covariance(read) + variance * np.outer(by_depth, by_depth)
+        whole = whole + varied_covariance(read, settings)[here] * posterior.variation**2
+        away = read.log_k - own_mean(read) - geometry[1] - by_depth * (middle - logs[here])
+        if read.certified is not None:
+            away = away - read.certified[0]
         root = np.linalg.inv(whole)
-        each = root @ ones
-        root = root - np.outer(each, each) / float(each.sum())
-    column = read.to_common
-    return column.T @ root @ column, column.T @ root @ away
+        column, by_ei = read.to_common, root.sum(axis=0)
+        return cls(
+            column.T @ root @ column,
+            column.T @ root @ away,
+            column.T @ by_ei,
+            float(by_ei.sum()),
+            float(by_ei @ away),
+        )
+
+    def __add__(self, other: "_Said") -> "_Said":
+        """Return what both say where the error of ln(EI) is one and the same."""
+        return _Said(
+            self.precision + other.precision,
+            self.pull + other.pull,
+            self.by_ei + other.by_ei,
+            self.ei_precision + other.ei_precision,
+            self.ei_pull + other.ei_pull,
+        )
+
+    def with_unknown(self, std: float) -> tuple[Floats, Floats]:
+        """Return precision, and precision times mean, where ln(EI) is not known so well."""
+        precision = self.ei_precision + std**-2 if std > 0.0 else math.inf
+        left = self.precision - np.outer(self.by_ei, self.by_ei) / precision
+        return np.asarray(left), np.asarray(self.pull - self.by_ei * self.ei_pull / precision)
+
+
+def _of_one_certificate(
+    readings: Sequence[Readings],
+    assessed: Sequence[Assessed],
+    weights: Sequence[Floats],
+    settings: FitSettings,
+) -> list[tuple[Floats, Floats]]:
+    """Return what standards say, those with one certificate together: its error is one for all."""
+    said: dict[tuple[float, float], _Said] = {}
+    for read, of, weight in zip(readings, assessed, weights, strict=True):
+        if read.certified is None:
+            continue
+        one = _Said.of(read, of, weight, settings)
+        before = said.get(read.certified)
+        said[read.certified] = one if before is None else before + one
+    return [each.with_unknown(std) for (_, std), each in said.items()]

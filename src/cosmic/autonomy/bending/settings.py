@@ -56,7 +56,8 @@ class FitSettings(StrictModel):
         the span: 0.3 times E/G for a rectangular section as thick as it looks, less for a thinner
         one. A campaign learns it.
     shear_own_part : float
-        By how much that differs between fibres, as a part of it: sections are no rectangles.
+        By how much that differs between fibres, as a part of it: sections are no rectangles, and
+        fibres are as wide as they lay, not as the jaws hold them.
     ei_length_um : float
         Length over which the stiffness of a fibre varies.
     reversal_um : float
@@ -91,9 +92,9 @@ class FitSettings(StrictModel):
     relaxation_std_part: float = Field(0.03, ge=0.0)
     side_un_um: float = Field(10.0, gt=0.0)
     side_std_part: float = Field(0.5, ge=0.0)
-    shear_part: float = Field(3.0, ge=0.0)
-    shear_std_part: float = Field(3.0, ge=0.0)
-    shear_own_part: float = Field(0.4, ge=0.0)
+    shear_part: float = Field(4.0, ge=0.0)
+    shear_std_part: float = Field(1.5, ge=0.0)
+    shear_own_part: float = Field(0.6, ge=0.0)
     ei_length_um: float = Field(150.0, gt=0.0)
     reversal_um: float = Field(0.3, ge=0.0)
     soft_percent: float = Field(30.0, gt=0.0)

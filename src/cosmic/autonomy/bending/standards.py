@@ -29,6 +29,9 @@ MOST_OFF: Final = 0.3
 CONTRADICTS: Final = 3.0
 """Standard deviations from which standard and certificate of the sensor do not go together."""
 
+UNFORESEEN: Final = 2.0
+"""Standard deviations beyond which the standard decides; nearer, both count as they are known."""
+
 DRIFTS: Final = 2.0
 EXACT: Final = 1e-6
 DISAGREE: Final = 1e-3
@@ -137,13 +140,14 @@ def check_standards(
         readings = [replace(each, refused=each.refused or text) for each in readings]
         return CheckedStandards(tuple(readings), settings, (*reasons, text))
     wider: dict[str, float] = {}
-    if abs(off) > settings.gain_std_part:
+    std = min(each.off_std_part for each in good)
+    foreseen = math.hypot(settings.gain_std_part, std)
+    if abs(off) > UNFORESEEN * foreseen:
         wider["gain_std_part"] = min(abs(off), 1.0)
     if drifts:
         wider["gain_drift_std_part"] = min(abs(slope), 1.0)
         reasons.append(f"the scale drifts by {100.0 * slope:+.1f} % over the campaign")
-    std = min(each.off_std_part for each in good)
-    if abs(off) > CONTRADICTS * math.hypot(settings.gain_std_part, std):
+    if abs(off) > CONTRADICTS * foreseen:
         reasons.append(
             f"the standard contradicts the sensor's certificate by {100.0 * off:+.1f} %: "
             "have the sensor calibrated"

@@ -547,11 +547,14 @@ class PushSpans(FibreOperation):
 
 def span_limits(work: HandlingContext) -> SpanLimits:
     """Return what spans there may be; shorter ones for a fibre that points up or down."""
-    push = work.settings.push
-    if not work.held_fibre().tilts:
-        return push.spans
-    longest = min(push.spans.longest_um, push.tilt_longest_um)
-    return push.spans.model_copy(update={"longest_um": longest})
+    push, fibre = work.settings.push, work.held_fibre()
+    longest, stroke = push.spans.longest_um, push.spans.longest_stroke_um
+    if fibre.standard:
+        longest = max(longest, work.settings.standard.longest_um)
+        stroke = max(stroke, push.spans.stroke_part * longest)
+    if fibre.tilts:
+        longest = min(longest, push.tilt_longest_um)
+    return push.spans.model_copy(update={"longest_um": longest, "longest_stroke_um": stroke})
 
 
 def fit_settings(work: HandlingContext, fibre: HeldFibre) -> FitSettings:

@@ -77,6 +77,20 @@ def test_a_gain_far_from_the_sensors_certificate_is_believed_and_said_aloud() ->
     assert "contradicts the sensor's certificate" in "".join(scale.reasons)
 
 
+def test_no_number_of_measurements_makes_a_beam_better_known_than_its_certificate() -> None:
+    certificate = Certificate(STANDARD_EI * SCALE, 0.04)
+    often = scale_of(*[1.0] * 12, certificate=certificate)
+    known = (0.02**-2 + SETTINGS.gain_std_part**-2) ** -0.5
+    assert known < often.off_std_part < 1.15 * known
+
+
+def test_a_poor_standard_does_not_outweigh_the_certificate_of_the_sensor() -> None:
+    poor = Certificate(STANDARD_EI * SCALE / 1.07, 0.12)
+    scale = scale_of(1.0, certificate=poor)
+    assert scale.verified
+    assert abs(scale.off_part) < 0.02, "of 7 % that it says, which may as well be its own error"
+
+
 def test_a_drift_larger_than_foreseen_is_followed() -> None:
     scale = scale_of(1.0, 1.05, 1.10)
     assert scale.verified

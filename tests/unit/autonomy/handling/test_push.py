@@ -253,6 +253,19 @@ def test_the_standard_is_round_and_is_not_slid():
     assert bench.heights_um == []
 
 
+@pytest.mark.parametrize(("standard", "farthest_um"), [(False, 600.0), (True, 870.0)])
+def test_the_standard_is_bent_farther_from_the_jaws_than_fibres(standard: bool, farthest_um: float):
+    bench = Bench(1.8e-10)
+    fibre = bench.held_fibre()
+    fibre.standard = standard
+    carried_out(PushSpans().run(bench))
+    places = [each.nominal_um for each in fibre.spans]
+    assert places[0] == pytest.approx(farthest_um, abs=5.0)
+    assert places[-1] < 300.0
+    forces = [float(np.ptp(each.force_un)) for each in fibre.spans]
+    assert min(forces) > (40.0 if standard else 15.0), "far out it is bent by as much more"
+
+
 def test_the_standard_is_bent_as_its_own_diameter_bears_and_not_as_wide_as_it_looks():
     strokes = []
     for width_um in (10.0, 80.0):
