@@ -190,6 +190,17 @@ def test_a_tare_calls_the_present_force_zero_and_says_what_it_was(rig: DaqcoRig)
         rig.daqco.tare("nothing")
 
 
+def test_a_mark_without_a_recording_is_not_lost_without_a_word(rig: DaqcoRig) -> None:
+    with pytest.raises(NotAvailable, match=r"nothing is recorded.*'here'.*begin a recording"):
+        rig.daqco.mark("here")
+    with rig.daqco.record(rig.daqco.directory / "marked.h5") as path:
+        rig.daqco.mark("here")
+    with pytest.raises(NotAvailable):
+        rig.daqco.mark("too late")
+    with open_recording(path) as recording:
+        assert [event.text for event in recording.events] == ["here"]
+
+
 def test_every_command_that_is_declared_is_carried_out(rig: DaqcoRig) -> None:
     assert set(GIVEN) == set(declaration_of(Daqco).commands)
     found = {name: give(rig) for name, give in GIVEN.items()}

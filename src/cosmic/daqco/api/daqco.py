@@ -414,7 +414,13 @@ class Daqco(Declared):
 
     @command
     def mark(self, text: str) -> None:
-        """Write a mark into the recording that runs."""
+        """Write a mark into the recording that runs.
+
+        Raises
+        ------
+        NotAvailable
+            Nothing is recorded.
+        """
         self._recorder.mark(text)
 
     @command(reads=True, remembered_s=FOLDER_AGE_S, meanwhile="")
