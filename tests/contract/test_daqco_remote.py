@@ -190,6 +190,15 @@ def test_a_tare_calls_the_present_force_zero_and_says_what_it_was(rig: DaqcoRig)
         rig.daqco.tare("nothing")
 
 
+@pytest.mark.parametrize("name", ["a.csv", "a", "a.tdms", "a.b", ""])
+def test_a_recording_is_written_under_no_name_of_another_format(rig: DaqcoRig, name: str) -> None:
+    file = rig.daqco.directory / name
+    with pytest.raises(RecordingError, match=r"end.* in \.h5"), rig.daqco.record(file):
+        pass
+    assert not file.is_file()
+    assert not rig.daqco.recording.active
+
+
 def test_a_mark_without_a_recording_is_not_lost_without_a_word(rig: DaqcoRig) -> None:
     with pytest.raises(NotAvailable, match=r"nothing is recorded.*'here'.*begin a recording"):
         rig.daqco.mark("here")

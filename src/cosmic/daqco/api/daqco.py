@@ -382,12 +382,17 @@ class Daqco(Declared):
         NotAvailable
             Nothing is acquired, or a recording runs already.
         RecordingError
-            The name, the directory or the disk forbid it, or there is such a file and
-            `overwrite` is False.
+            The name, which ends in .h5, the directory or the disk forbid it, or there is such a
+            file and `overwrite` is False.
         ConfigError
             `before_s` is out of range.
         """
         path = self._file(path, RECORDINGS)
+        if path.suffix.lower() not in RECORDINGS:
+            raise RecordingError(
+                f"{path}: a recording is an HDF5 file whose name ends in .h5; record to "
+                f"{path.stem or 'push'}.h5, and export that to CSV or TDMS afterwards"
+            )
         self._recorder.start(path, overwrite=overwrite, before_s=before_s)
 
     @command(timeout_s=SLOW_S)
