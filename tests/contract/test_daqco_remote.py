@@ -199,6 +199,13 @@ def test_a_recording_is_written_under_no_name_of_another_format(rig: DaqcoRig, n
     assert not rig.daqco.recording.active
 
 
+def test_a_folder_is_named_by_text_or_path(rig: DaqcoRig) -> None:
+    folder = rig.daqco.directory
+    assert rig.daqco.folder_problem(folder) == rig.daqco.folder_problem(str(folder)) == ""
+    nowhere = folder / "nowhere"
+    assert rig.daqco.folder_problem(nowhere) == rig.daqco.folder_problem(str(nowhere)) != ""
+
+
 def test_a_mark_without_a_recording_is_not_lost_without_a_word(rig: DaqcoRig) -> None:
     with pytest.raises(NotAvailable, match=r"nothing is recorded.*'here'.*begin a recording"):
         rig.daqco.mark("here")

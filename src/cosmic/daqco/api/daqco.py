@@ -1,6 +1,7 @@
 """The one interface of DAQCo: ``rig.daqco``, its windows, plans and stations use nothing else."""
 
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -429,8 +430,9 @@ class Daqco(Declared):
         self._recorder.mark(text)
 
     @command(reads=True, remembered_s=FOLDER_AGE_S, meanwhile="")
-    def folder_problem(self, directory: str) -> str:
+    def folder_problem(self, directory: str | Path) -> str:
         """Return why nothing can be recorded in `directory`; empty when it can."""
+        directory = os.fspath(directory)
         if not called_remotely() or not directory.strip():
             return directory_problem(directory)
         try:
