@@ -203,6 +203,7 @@ def test_a_folder_is_named_by_text_or_path(rig: DaqcoRig) -> None:
     folder = rig.daqco.directory
     assert rig.daqco.folder_problem(folder) == rig.daqco.folder_problem(str(folder)) == ""
     nowhere = folder / "nowhere"
+    assert rig.daqco.folder_problem("") == "type a directory"
     assert rig.daqco.folder_problem(nowhere) == rig.daqco.folder_problem(str(nowhere)) != ""
 
 

@@ -89,7 +89,7 @@ def test_a_rig_writes_the_truth_and_takes_faults_of_every_part(tmp_path: Any) ->
         rig.faults.inject("missed_grasp")
         rig.faults.inject("board stalled")
         for unknown in ("foo", 5, "board foo"):
-            with pytest.raises(cosmic.CosmicError, match="no fault .* known: scene missed_grasp"):
+            with pytest.raises(cosmic.CosmicError, match=r"no fault .* known: scene missed_grasp"):
                 rig.faults.inject(unknown)
         assert len(rig.faults.active) == 2
         rig.faults.clear()
