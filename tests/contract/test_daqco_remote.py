@@ -99,6 +99,12 @@ def _refused_as_at_home(rig: DaqcoRig) -> None:
     assert type(refused.value).__name__ == "NotConnectedError"
     with pytest.raises(ConfigError):
         daqco.configure(rate_hz=float("nan"))
+    with pytest.raises(ConfigError) as too_slow:
+        daqco.configure(rate_hz=5.0)
+    assert str(too_slow.value) == (
+        "the sampling rate cannot be set: rate_hz should be greater than or equal to 10, not 5.0; "
+        "the old one stays"
+    )
     with pytest.raises(ConfigError, match="no active channel"):
         daqco.arm_limit("nothing", high=1.0)
     with pytest.raises(ConfigError):

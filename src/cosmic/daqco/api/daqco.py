@@ -39,6 +39,7 @@ from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.background import OnResult
 from cosmic.frame.clock import Clock
+from cosmic.frame.config import wrong_values
 from cosmic.frame.declaration import Companion, Declared, command, newest, state, stream
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable, RecordingError
 from cosmic.frame.file_names import NameOption, directory_problem, space_left
@@ -324,8 +325,10 @@ class Daqco(Declared):
         try:
             fields = self.settings.model_dump() | {"rate_hz": rate_hz}
             settings = DaqcoSettings.model_validate(fields)
-        except ValueError as exc:
-            raise ConfigError(f"rate_hz: {rate_hz!r} is not accepted: {exc}") from None
+        except ValidationError as exc:
+            raise ConfigError(
+                f"the sampling rate cannot be set: {wrong_values(exc)}; the old one stays"
+            ) from None
         self.apply(settings)
 
     @command(timeout_s=SLOW_S)
