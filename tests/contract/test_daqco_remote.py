@@ -99,6 +99,12 @@ def _refused_as_at_home(rig: DaqcoRig) -> None:
     assert type(refused.value).__name__ == "NotConnectedError"
     with pytest.raises(ConfigError):
         daqco.configure(rate_hz=float("nan"))
+    with pytest.raises(ConfigError) as too_slow:
+        daqco.configure(rate_hz=5.0)
+    assert str(too_slow.value) == (
+        "the sampling rate cannot be set: rate_hz should be greater than or equal to 10, not 5.0; "
+        "the old one stays"
+    )
     with pytest.raises(ConfigError, match="no active channel"):
         daqco.arm_limit("nothing", high=1.0)
     with pytest.raises(ConfigError):
@@ -188,6 +194,34 @@ def test_a_tare_calls_the_present_force_zero_and_says_what_it_was(rig: DaqcoRig)
     assert wait_until(lambda: abs(rig.daqco.latest()["force"]) < 0.2)
     with pytest.raises(NotAvailable):
         rig.daqco.tare("nothing")
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a", "a.tdms", "a.b", ""])
+def test_a_recording_is_written_under_no_name_of_another_format(rig: DaqcoRig, name: str) -> None:
+    file = rig.daqco.directory / name
+    with pytest.raises(RecordingError, match=r"end.* in \.h5"), rig.daqco.record(file):
+        pass
+    assert not file.is_file()
+    assert not rig.daqco.recording.active
+
+
+def test_a_folder_is_named_by_text_or_path(rig: DaqcoRig) -> None:
+    folder = rig.daqco.directory
+    assert rig.daqco.folder_problem(folder) == rig.daqco.folder_problem(str(folder)) == ""
+    nowhere = folder / "nowhere"
+    assert rig.daqco.folder_problem("") == "type a directory"
+    assert rig.daqco.folder_problem(nowhere) == rig.daqco.folder_problem(str(nowhere)) != ""
+
+
+def test_a_mark_without_a_recording_is_not_lost_without_a_word(rig: DaqcoRig) -> None:
+    with pytest.raises(NotAvailable, match=r"nothing is recorded.*'here'.*begin a recording"):
+        rig.daqco.mark("here")
+    with rig.daqco.record(rig.daqco.directory / "marked.h5") as path:
+        rig.daqco.mark("here")
+    with pytest.raises(NotAvailable):
+        rig.daqco.mark("too late")
+    with open_recording(path) as recording:
+        assert [event.text for event in recording.events] == ["here"]
 
 
 def test_every_command_that_is_declared_is_carried_out(rig: DaqcoRig) -> None:

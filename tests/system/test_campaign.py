@@ -13,7 +13,7 @@ from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.recipe import OutputSettings
 from cosmic.autonomy.campaign.records import CampaignError, Outcome
 from cosmic.autonomy.campaign.store_read import CampaignReader
-from cosmic.frame.errors import ConfigError
+from cosmic.frame.errors import ArgumentError, ConfigError
 from cosmic.twin.truth import TruthRecord, read_truth
 from system.campaign_bench import Bench, bench
 from system.campaign_trial import Trial
@@ -140,6 +140,18 @@ def test_a_wrong_recipe_is_refused_with_file_key_and_reason(rig: Rig, home: Path
     with pytest.raises(ConfigError, match=r"juggle-1\.toml: procedure: .*bend test"):
         rig.campaign(wrong, home / "never")
     assert not (home / "never").exists()
+
+
+def test_a_folder_without_a_name_is_refused(
+    rig: Rig, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = home / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    for empty in ("", " "):
+        with pytest.raises(ArgumentError, match="folder is empty; give one by name"):
+            rig.campaign(recipe(home, 1), empty)
+    assert not list(here.iterdir())
 
 
 @pytest.mark.parametrize("operation", ["close the gripper", "carry to the probe", "push the spans"])

@@ -273,6 +273,17 @@ def test_a_new_set_point_beyond_the_limits_is_refused_and_the_old_one_stays(far:
     assert far.rig.control.loops == ()
 
 
+def test_numbers_that_make_no_sense_are_named_in_plain_words(far: Bench) -> None:
+    with pytest.raises(cosmic.ConfigError) as refused:
+        far.rig.control.hold_force(
+            "force", "left.y", 50.0, direction=-1, travel_um=-1.0, ramp_un_s=0.0
+        )
+    assert str(refused.value) == (
+        "a loop cannot be made: travel_um should be greater than 0, not -1.0; "
+        "ramp_un_s should be greater than 0, not 0.0"
+    )
+
+
 @pytest.mark.parametrize(
     ("asked", "error"),
     [

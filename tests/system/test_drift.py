@@ -1,5 +1,6 @@
 """Where the probe is beside the jaws is seen again while a campaign runs."""
 
+import math
 import shutil
 from pathlib import Path
 
@@ -40,6 +41,10 @@ def test_a_zoom_that_comes_to_rest_at_another_scale_moves_no_span(tmp_path: Path
         config, rate=20.0, sample="three-dry", seed=3, world="zoom", truth=truth
     ) as rig:
         rig.campaign(recipe, tmp_path / "out").run_here()
+        drift = rig.calibrations.get("drift of the tips", "left")
+    assert drift is not None
+    stayed_um = math.hypot(drift.values["gripper_x_um"], drift.values["gripper_y_um"])
+    assert stayed_um < 3.0, "the scale of the image is no drift of the gripper"
     reader, touched = CampaignReader(tmp_path / "out"), read_truth(truth).of("touched")
     off_um = []
     for record in reader.fibres():

@@ -194,6 +194,26 @@ def test_closing_releases_the_hold_and_leaves_nothing_moving():
         assert scene.truth()["left.x"] == pytest.approx(at, abs=1.0)
 
 
+def test_a_closed_platform_says_so_at_once_and_writes_nothing(tmp_path):
+    with cosmic.connect(rate=1.0) as rig:
+        camera = rig.vico.camera()
+        camera.next_image()
+        waited = camera.await_image(since_s=1e9)
+    began_s = WALL.now_s()
+    assert "closed" in str(waited.exception(20.0))
+    for ask in (
+        camera.next_image,
+        camera.triggered_image,
+        lambda: camera.await_image(since_s=1e9).wait(20.0),
+        lambda: rig.campaign("quick", tmp_path / "after"),
+        rig.calibrate,
+    ):
+        with pytest.raises(cosmic.NotAvailable, match="closed"):
+            ask()
+    assert WALL.now_s() - began_s < 3.0
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_closed_platform_leaves_nothing_in_memory():
     kept = []
     for _ in range(2):

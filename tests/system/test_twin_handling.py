@@ -88,6 +88,9 @@ def test_a_rig_writes_the_truth_and_takes_faults_of_every_part(tmp_path: Any) ->
     ) as rig:
         rig.faults.inject("missed_grasp")
         rig.faults.inject("board stalled")
+        for unknown in ("foo", 5, "board foo"):
+            with pytest.raises(cosmic.CosmicError, match=r"no fault .* known: scene missed_grasp"):
+                rig.faults.inject(unknown)
         assert len(rig.faults.active) == 2
         rig.faults.clear()
         rig.mico["left.x"].move_to(2000.0)

@@ -390,7 +390,7 @@ def _add_procedure_commands(
         parents=[platform, _connect_options()],
     )
     campaign.add_argument("recipe", type=Path, metavar="RECIPE", help="a file, or a shipped name")
-    campaign.add_argument("--out", type=Path, required=True, metavar="FOLDER")
+    campaign.add_argument("--out", type=_path, required=True, metavar="FOLDER")
     campaign.add_argument("--seed", type=int, help="seed of the simulation")
     plate = commands.add_parser("plate", help="confirm the plate that a running campaign asks for")
     plate.add_argument("folder", type=Path, metavar="FOLDER", help="of the campaign")

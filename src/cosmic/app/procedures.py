@@ -19,7 +19,7 @@ from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.shipped.calibrate import build_calibrate, calibration_names
 from cosmic.frame.arguments import check_path, checked
-from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.errors import ArgumentError, ConfigError, NotAvailable
 from cosmic.frame.version import __version__
 from cosmic.vico.api.application import VicoApplication
 
@@ -37,6 +37,8 @@ def campaign_on(
     for name, value in (("recipe", recipe), ("folder", folder)):
         if not isinstance(value, Recipe):
             check_path(name, value)
+            if not str(value).strip():
+                raise ArgumentError(f"{name} is empty; give one by name, such as 'out'")
     if plates is None and platform.scene is not None:
         plates = TwinPlates(platform.scene, platform.clock)
     read = recipe if isinstance(recipe, Recipe) else read_recipe(Path(recipe))

@@ -176,11 +176,14 @@ class Rig:
             The recipe is wrong, a line for every mistake, or the platform has not what it names.
         CampaignError
             The folder holds another campaign, is in use, or cannot be written.
+        ArgumentError
+            `folder` is empty, or no file can be called so.
         NotAvailable
-            An application is not hosted here, or something runs.
+            An application is not hosted here, something runs, or the platform is closed.
         """
         from cosmic.app.procedures import campaign_on  # loads statistics, which takes a second
 
+        self._check_open()
         handling = self._shared.handling
         if handling is not None and handling.running:
             raise NotAvailable("an operation on a fibre is running; wait until it has ended")
@@ -224,12 +227,13 @@ class Rig:
         Raises
         ------
         NotAvailable
-            An application is not hosted here, or something runs.
+            An application is not hosted here, something runs, or the platform is closed.
         ConfigError
             The platform has not what `settings` names, or there is no such calibration.
         """
         from cosmic.app.procedures import calibration_on
 
+        self._check_open()
         if other := self.running:
             raise NotAvailable(f"{other} is running; end it first")
         procedure, work = calibration_on(self, settings, anew, zooms=zooms)
@@ -337,7 +341,12 @@ class Rig:
         """Return a run that begins only while nothing else runs."""
         return self._made(procedure, work, lambda: self.running)
 
+    def _check_open(self) -> None:
+        if self._shared.closed:
+            raise NotAvailable("the platform is closed; connect again for another one")
+
     def _made(self, procedure: Procedure[W], work: W, busy: Callable[[], str]) -> ProcedureRun[W]:
+        self._check_open()
         run = ProcedureRun(
             procedure,
             work,

@@ -7,6 +7,7 @@ from typing import Any, Final, Protocol
 from cosmic.app.configuration.platform_file import PlatformFile, load_twin
 from cosmic.daqco.hw.sim_faults import NAMES as BOARD_NAMES
 from cosmic.frame.clock import Clock
+from cosmic.frame.errors import ArgumentError
 from cosmic.mico.hw.sim_faults import NAMES as CONTROLLER_NAMES
 from cosmic.twin.plates import Plates
 from cosmic.twin.scene import Scene
@@ -104,21 +105,21 @@ class SimulationFaults:
 
         Raises
         ------
-        ValueError
+        ArgumentError
             There is no such fault here, or it cannot be there.
         """
         part, plain = self._find(name)
         try:
             part.inject(plain, **where)
         except TypeError:
-            raise ValueError(f"fault {name!r} takes no {', '.join(where)}") from None
+            raise ArgumentError(f"fault {name!r} takes no {', '.join(where)}") from None
 
     def clear(self, name: str | None = None, **where: Any) -> None:
         """End a fault, or without a name all of them.
 
         Raises
         ------
-        ValueError
+        ArgumentError
             There is no such fault here.
         """
         if name is not None:
@@ -129,13 +130,13 @@ class SimulationFaults:
             part.clear()
 
     def _find(self, name: str) -> tuple[_Part, str]:
-        named, _, plain = name.partition(" ")
+        named, _, plain = str(name).partition(" ")
         if plain and named in self._parts and plain in FAULT_NAMES[named]:
             return self._parts[named], plain
         for part, names in FAULT_NAMES.items():
             if part in self._parts and name in names:
                 return self._parts[part], name
-        raise ValueError(f"there is no fault {name!r} here; known: {', '.join(self.names)}")
+        raise ArgumentError(f"there is no fault {name!r} here; known: {', '.join(self.names)}")
 
 
 def make_scene(

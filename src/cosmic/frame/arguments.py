@@ -214,6 +214,11 @@ def _path(value: object) -> object:
     return Path(value)
 
 
+def _named(value: object) -> object:
+    """Return a path; an empty text as it is, for a path of it is the working directory."""
+    return value if isinstance(value, str) and not value else _path(value)
+
+
 def _time(check: Check) -> Check:
     """Return a check for seconds: finite, and no more than can be waited for."""
 
@@ -253,7 +258,8 @@ def _any_of(hint: Any) -> Check | None:
     kinds = typing.get_args(hint)
     paths = any(each is Path or typing.get_origin(each) is os.PathLike for each in kinds)
     # A text beside a path is one.
-    checks = [_path if paths and each is str else _check_for(each) for each in kinds]
+    named = (str, Path) if paths and str in kinds else ()
+    checks = [_named if each in named else _check_for(each) for each in kinds]
     if any(each is None for each in checks):
         return None
 

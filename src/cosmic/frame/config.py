@@ -105,6 +105,18 @@ def check_model(path: Path | str, data: object, model: type[M], *, under: str = 
         raise ConfigError("\n".join(_lines(path, exc, under))) from None
 
 
+def wrong_values(error: ValidationError) -> str:
+    """Return what is wrong with values that a call was given: name, what fits, what was given."""
+    return "; ".join(_wrong(item) for item in error.errors(include_url=False))
+
+
+def _wrong(item: ErrorDetails) -> str:
+    reason = _reason(item["type"], item["msg"])
+    if item["type"] == "value_error" or not item["loc"]:
+        return reason
+    return f"{_key(item['loc'])} {reason.removeprefix('Input ')}, not {item['input']!r}"
+
+
 def _lines(path: Path | str, error: ValidationError, under: str) -> list[str]:
     table = (under,) if under else ()
     return [

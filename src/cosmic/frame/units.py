@@ -22,6 +22,8 @@ _TO_STEPS: Final = {"steps": 1.0, "step": 1.0}
 _FACTORS: Final[dict[str, dict[str, float]]] = {
     "um": _TO_UM,
     "deg": _TO_DEG,
+    "um/s": {f"{unit}/s": factor for unit, factor in _TO_UM.items()},
+    "deg/s": {f"{unit}/s": factor for unit, factor in _TO_DEG.items()},
     "V": _TO_V,
     "Hz": _TO_HZ,
     "steps": _TO_STEPS,
@@ -32,7 +34,15 @@ _QUANTITY: Final = re.compile(
 
 _ASCII_MICRO: Final = re.compile(r"(?<![A-Za-z_'\"`])u(?=[mNV](?![A-Za-z_]))")
 
-DISPLAY: Final = {"um": "µm", "deg": "°", "V": "V", "Hz": "Hz", "steps": "steps"}
+DISPLAY: Final = {
+    "um": "µm",
+    "deg": "°",
+    "um/s": "µm/s",
+    "deg/s": "°/s",
+    "V": "V",
+    "Hz": "Hz",
+    "steps": "steps",
+}
 
 
 def parse_quantity(text: str, unit: str) -> float:
@@ -43,7 +53,8 @@ def parse_quantity(text: str, unit: str) -> float:
     text : str
         Such as "120", "-0.2 mm", "1.5 deg"; a decimal point, no thousands separators.
     unit : str
-        The unit wanted and assumed where none is written: "um", "deg", "V", "Hz", "steps".
+        The unit wanted and assumed where none is written: "um", "deg", "um/s", "deg/s", "V",
+        "Hz", "steps".
 
     Raises
     ------

@@ -57,9 +57,9 @@ class TwinLens:
         """Return where the lens truly is at `now_s`, which may lie in the past."""
         return self._motors[axis].leg(now_s).lens_at(now_s)
 
-    def run_s(self, axis: LensAxisName, now_s: float) -> float:
-        """Return when the run began that left the lens where it is at `now_s`, or its rest."""
-        return self._motors[axis].leg(now_s).start_s
+    def run_number(self, axis: LensAxisName, now_s: float) -> int:
+        """Return which run left the lens where it is at `now_s`: 1 for the first, 0 before."""
+        return self._motors[axis].leg(now_s).run
 
     def counter(self, axis: LensAxisName, now_s: float) -> int:
         """Return what the controller counts; wrong after lost steps."""

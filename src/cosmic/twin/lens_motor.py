@@ -96,6 +96,8 @@ class Leg:
         At its beginning: steps as counted, where the motor is, where the lens is.
     share : float
         Part of the steps sent that the motor makes; less than 1 when it loses some.
+    run : int
+        How many runs had begun, with this one.
     """
 
     phase: LensPhase
@@ -108,6 +110,7 @@ class Leg:
     share: float
     travel: tuple[float, float]
     play: float
+    run: int = 0
 
     @property
     def end_s(self) -> float:
@@ -173,7 +176,8 @@ class LensMotor:
 
     def begin(self, time_s: float, distances: tuple[tuple[LensPhase, float], ...]) -> None:
         """Go signed ways one after the other from `time_s` on; what was planned is dropped."""
-        leg = self._standing(time_s)
+        standing = self._standing(time_s)
+        leg = replace(standing, run=standing.run + 1)
         legs = []
         for phase, distance in distances:
             leg = self._next(leg, phase, distance)
@@ -207,7 +211,8 @@ class LensMotor:
         leg = self._standing(time_s)
         low, high = leg.travel
         lens = min(max(leg.lens + distance, low), high)
-        self._follow(time_s, replace(leg, lens=lens, motor=leg.motor + lens - leg.lens))
+        motor = leg.motor + lens - leg.lens
+        self._follow(time_s, replace(leg, lens=lens, motor=motor, run=leg.run + 1))
 
     def _standing(self, time_s: float) -> Leg:
         leg = self.leg(time_s)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from threading import Lock
 from typing import Final
 
+from cosmic.frame.errors import ArgumentError
 from cosmic.twin.fate import Fate
 from cosmic.twin.handling_settings import HandlingSettings
 
@@ -96,14 +97,14 @@ class TwinFaults:
 
         Raises
         ------
-        ValueError
+        ArgumentError
             No such fault, or a number that makes no sense.
         """
         _check_name(name)
         if not times >= 1:
-            raise ValueError(f"fault {name!r}: times must be 1 or more, got {times!r}")
+            raise ArgumentError(f"fault {name!r}: times must be 1 or more, got {times!r}")
         if amount is not None and not math.isfinite(amount):
-            raise ValueError(f"fault {name!r}: amount must be a finite number, got {amount!r}")
+            raise ArgumentError(f"fault {name!r}: amount must be a finite number, got {amount!r}")
         fault = TwinFault(name, tool, times, amount)
         if self.begin is not None and name in LASTING_NAMES:
             self.begin(fault, True)
@@ -115,7 +116,7 @@ class TwinFaults:
 
         Raises
         ------
-        ValueError
+        ArgumentError
             No such fault.
         """
         if name is not None:
@@ -172,4 +173,4 @@ class TwinFaults:
 
 def _check_name(name: str) -> None:
     if name not in NAMES:
-        raise ValueError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")
+        raise ArgumentError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")

@@ -214,8 +214,9 @@ def test_interrupting_the_console_halts_what_moves(make: Make, qtbot: QtBot) -> 
     panel = ready(window, qtbot)
     console = window.console
     assert console is not None
-    console.run('rig.mico["left.x"].move_to(5000)')
     card = panel.cards["left.x"]
+    card.axis.set_closed_loop_frequency(100)  # 34 s to the target: a busy machine sees it move
+    console.run('rig.mico["left.x"].move_to(5000)')
     qtbot.waitUntil(lambda: card.axis.details.in_motion)
     console.interrupt()
     qtbot.waitUntil(lambda: not console.busy and not card.axis.details.in_motion)

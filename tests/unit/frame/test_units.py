@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from cosmic.frame.errors import QuantityError
 from cosmic.frame.units import DISPLAY, format_quantity, parse_quantity, with_micro_signs
 
-UNITS = ["um", "deg", "V", "Hz", "steps"]
+UNITS = ["um", "deg", "um/s", "deg/s", "V", "Hz", "steps"]
 numbers = st.floats(min_value=-1e9, max_value=1e9)
 
 

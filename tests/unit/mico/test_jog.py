@@ -94,6 +94,25 @@ def test_a_senseless_jog_is_refused(direction, speed):
     assert not controller.of("move_to")
 
 
+@pytest.mark.parametrize("speed", ["150 um/s", "0.15 mm/s", "150", " 150 µm/s "])
+def test_a_speed_may_be_said_with_its_unit(speed):
+    with mico() as (rig, controller):
+        rig["d0.c0"].jog(1, speed=speed).movement.wait(2)
+        steered = rig["d0.c0"].steer(f"-{speed.strip()}", dead_man_s=0.2).movement
+        assert steered.exception(2.0) is not None, "nobody renewed it"
+        speeds = [call[2] for call in controller.of("frequency") if call[1] == X]
+        assert speeds[1::2] == [150, 750], "a hand that steers may catch up"
+        targets = [call[2] for call in controller.of("move_to")]
+        assert targets[-1] < max(targets), "the other way"
+
+
+@pytest.mark.parametrize("speed", ["5 um", "5 deg/s", "5 Hz", "5 um/min"])
+def test_a_speed_in_another_unit_is_refused_with_those_that_fit(speed):
+    with mico() as (rig, controller), pytest.raises(cosmic.MoveRefused, match="use one of nm/s"):
+        rig["d0.c0"].jog(1, speed)
+    assert not controller.of("move_to")
+
+
 def test_a_jog_limits_the_speed_while_it_lasts_and_gives_it_back():
     with mico() as (rig, controller):
         rig["d0.c0"].set_closed_loop_frequency(4000)

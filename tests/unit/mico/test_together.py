@@ -1,5 +1,6 @@
 """Axes that move together: linked, started back to back, arriving at the same time."""
 
+import math
 import sys
 import threading
 
@@ -51,6 +52,14 @@ def test_links_with_an_axis_in_common_make_a_chain():
         assert not rig.links
         rig[LEFT].move_to(0.0)
         assert rig[RIGHT].position_um == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize("ratio", [math.nan, math.inf, 0.0, -1e4])
+def test_a_ratio_that_makes_no_sense_links_nothing(ratio: float) -> None:
+    with mico(TWO) as (rig, _):
+        with pytest.raises(cosmic.NotAvailable, match=r"the ratio .* is not within 0\.001 to 1000"):
+            rig.link(LEFT, RIGHT, ratio=ratio)
+        assert not rig.links
 
 
 def test_both_are_decided_together_and_neither_moves_where_one_may_not():

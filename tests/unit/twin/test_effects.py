@@ -479,6 +479,21 @@ def test_each_run_of_the_zoom_ends_at_another_scale_and_place() -> None:
     assert 2.0 < np.std(focuses) < 150.0
 
 
+def test_a_seed_has_the_zoom_come_to_rest_alike_whenever_it_runs() -> None:
+    def scales(later_s: float) -> list[float]:
+        scene = Scene.from_settings(microscope(zoom_scale=0.004), ManualClock(), 3)
+        assert scene.optics is not None and scene.lens is not None
+        seen = []
+        for run in range(3):
+            scene.lens.seek("zoom", 6000 - 3000 * (run % 2), later_s + 100.0 * run)
+            seen.append(scene.optics.projection(later_s + 100.0 * run + 50.0).px_um)
+        return seen
+
+    first = scales(0.5)
+    assert first == scales(7.25)
+    assert first[0] != first[2], "at the same zoom"
+
+
 def test_the_focus_moves_with_the_zoom() -> None:
     def focus(zoom_counts: int) -> float:
         scene = Scene.from_settings(microscope(focus_shift_um=100.0), ManualClock())

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -158,6 +159,21 @@ def test_another_width_or_direction_than_expected_is_doubted() -> None:
     leaning = find_probe(image.image, replace(image.expected, forward=turned))
     assert isinstance(leaning, ToolEnd)
     assert any("points 12 degrees away" in doubt for doubt in leaning.doubts)
+
+
+def test_a_probe_is_doubted_that_a_thin_fibre_lies_against() -> None:
+    for seed in range(4):
+        image = tool_image(seed, width=12.0, specks=0)
+        assert probe(image).certain
+        x, y = image.forward
+        side, lean = np.array([-y, x]), math.radians(5.0)
+        start = image.hold + 6.0 * side - 12.0 * image.forward
+        end = start + 60.0 * (math.sin(lean) * side - math.cos(lean) * image.forward)
+        ends = [tuple(np.rint(each * 16).astype(int).tolist()) for each in (start, end)]
+        cv2.line(image.image, *ends, 90, 2, cv2.LINE_AA, shift=4)
+        found = probe(image)
+        assert math.dist(found.tip_px, image.hold) > 0.4, "more than it says"
+        assert found.doubts == ("something lies against a side of it",)
 
 
 def test_a_jaw_whose_front_is_hidden_is_doubted() -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from cosmic.frame.errors import ConfigError, CosmicError, RecordingError
+from cosmic.frame.interruption import Interrupted
 from cosmic.vico.api.measure import (
     NOT_KNOWN,
     SUFFIXES,
@@ -38,8 +39,6 @@ LONGEST_NAME = 255
 LONGEST_STEM_BYTES = 200
 """What is added to it has to fit into the name of a file as well."""
 MOST_UM = 1e6
-INTERRUPTED = 130
-"""Exit code that a shell has for Ctrl-C."""
 
 
 @dataclass(slots=True)
@@ -81,22 +80,22 @@ def run(chosen: argparse.Namespace) -> int:
     _prepare(folder, files, overwrite=chosen.overwrite)
     results = Results()
     try:
-        interrupted = _interrupted(files, folder, chosen, results)
+        ended = _measured_all(files, folder, chosen, results)
     finally:  # what was measured is kept whatever ends the run
         if results.measured:  # else they would be in the way of the next run
             _write_tables(folder, results, spatial=chosen.focal_stack)
     text = summary(results.measured, len(results.refused), len(results.pages_refused))
     where = f"{folder}\n" if results.measured else ""
     sys.stdout.write(encoded(f"{text}{where}").decode())
-    if interrupted:
-        return INTERRUPTED
+    if ended is not None:
+        return ended.exit_code
     return 1 if results.refused or results.pages_refused else 0
 
 
-def _interrupted(
+def _measured_all(
     files: Sequence[Path], folder: Path, chosen: argparse.Namespace, results: Results
-) -> bool:
-    """Measure all files; return whether Ctrl-C ended it."""
+) -> Interrupted | None:
+    """Measure all files; return the signal that ended it, if any."""
     begun = 0
     try:
         for begun, file in enumerate(files, start=1):
@@ -105,15 +104,15 @@ def _interrupted(
                 _measure_file(file, folder, _stem(begun, file), chosen, results)
             except CosmicError as exc:
                 results.refuse(file, exc)
-    except KeyboardInterrupt:
+    except Interrupted as exc:
         _say(
             f"interrupted at file {begun} of {len(files)}; the tables hold what was measured "
             "until then"
         )
-        return True
+        return exc
     if sys.stderr.isatty():
         sys.stderr.write("\n")
-    return False
+    return None
 
 
 def _write_tables(folder: Path, results: Results, *, spatial: bool) -> None:

@@ -13,14 +13,13 @@ from cosmic.autonomy.handling.prepare import (
     HELD,
     PLATE,
     PROBE,
-    beside_jaws,
+    image_where_mapped,
     see_both,
     zoom_to,
 )
 from cosmic.autonomy.handling.tips import TIMES_STD, Off, TipOff, shift_maps, tip_off
 from cosmic.autonomy.procedures.operation import SAFE_POINT, Steps, Yielded
 from cosmic.frame.errors import NotAvailable
-from cosmic.vico.core.image import CameraImage
 
 DRIFT: Final = "drift of the tips"
 
@@ -54,13 +53,12 @@ class CheckDrift(FibreOperation):
 def look_at_both(
     work: HandlingContext,
 ) -> Generator[Yielded, object, tuple[TipOff, TipOff, TipOff]]:
-    """Hold both tips where fibres are pushed, and look at them; raises `NotAvailable`.
+    """Look at the gripper where the maps were made, and at both tips; raises `NotAvailable`.
 
-    The gripper is seen before the zoom runs, which moves the image, and both at a higher zoom.
+    The gripper is seen before the zoom runs, which moves the image, and both at a higher zoom
+    where fibres are pushed.
     """
-    yield from beside_jaws(work)
-    image = yield work.image()
-    assert isinstance(image, CameraImage)
+    image = yield from image_where_mapped(work)
     here = tip_off(work, image, work.gripper)
     try:
         yield from zoom_to(work, work.settings.calibration.compare_zoom)

@@ -213,7 +213,7 @@ class ForceCalibration:
         if load is not None and not abs(read_un - zero) > max(CLEAR * std_un, 0.3 * load.force_un):
             raise CalibrationProblem(
                 f"{load.words} is not to be seen: {read_un - zero:+.2f} µN instead of "
-                f"{load.force_un:.2f}. Put it there, and read again"
+                f"{load.force_un:.2f} µN. Put it there, and read again"
             )
         self._readings.append(LoadReading(load, read_un, std_un))
 

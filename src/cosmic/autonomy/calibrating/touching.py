@@ -118,7 +118,7 @@ class TouchJaw(Calibrated):
             if abs(here - before) > settings.touch_step_um:
                 raise CalibrationRefused(
                     f"a step of the probe went {abs(here - before):.2f} um, at most "
-                    f"{settings.touch_step_um:g} are safe; lower touch_step_v"
+                    f"{settings.touch_step_um:g} um are safe; lower touch_step_v"
                 )
             if abs(force - base_un) > settings.touch_un:
                 return 0.5 * (before + here)

@@ -3,10 +3,13 @@
 import math
 from typing import Final
 
+from pydantic import ValidationError
+
 from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.autonomy.control.sink import AxisSink
 from cosmic.autonomy.control.sources import ChannelSource, PositionSource, Source
 from cosmic.daqco.api.daqco import Daqco
+from cosmic.frame.config import wrong_values
 from cosmic.frame.errors import ConfigError, NotAvailable, UnknownAxisError
 from cosmic.mico.api.mico import Mico
 
@@ -53,8 +56,8 @@ class LoopParts:
         fields = {name: value for name, value in changes.items() if value is not None}
         try:
             settings = ControlSettings.model_validate(self._settings.model_dump() | fields)
-        except ValueError as exc:
-            raise ConfigError(f"a loop cannot be made: {exc}") from None
+        except ValidationError as exc:
+            raise ConfigError(f"a loop cannot be made: {wrong_values(exc)}") from None
         # On a fast clock the same cycles are longer: the force comes later, and all goes slower.
         latency_s = max(settings.latency_s, CYCLES * self._rate / settings.rate_hz)
         response_s = max(settings.response_s, RESPONSE * latency_s)

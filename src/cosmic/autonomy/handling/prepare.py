@@ -330,10 +330,7 @@ class Register(FibreOperation):
         known, settings = work.calibration, work.settings.calibration
         if known.zoom_run == work.shared.zoom_runs or work.vico.lens is None:
             return
-        yield from to_position(work, settings.place_x_um, settings.place_y_um)
-        yield work.go_up(work.hold_tip_um)
-        image = yield work.image()
-        assert isinstance(image, CameraImage)
+        image = yield from image_where_mapped(work)
         try:
             seen = tip_off(work, image, work.gripper)
         except NotAvailable as exc:
@@ -349,6 +346,19 @@ class Register(FibreOperation):
         shift_maps(work, seen, lens=True)
         known.zoom_run = work.shared.zoom_runs
         yield SAFE_POINT
+
+
+def image_where_mapped(work: HandlingContext) -> Generator[Yielded, object, CameraImage]:
+    """Take an image of the gripper where the maps were made, and set right after the zoom ran.
+
+    Elsewhere the tip is off by what a run of the zoom does to the scale.
+    """
+    settings = work.settings.calibration
+    yield from to_position(work, settings.place_x_um, settings.place_y_um)
+    yield work.go_up(work.hold_tip_um)
+    image = yield work.image()
+    assert isinstance(image, CameraImage)
+    return image
 
 
 def to_position(work: HandlingContext, x_um: float, y_um: float) -> Steps:

@@ -1,6 +1,7 @@
 """The one interface of DAQCo: ``rig.daqco``, its windows, plans and stations use nothing else."""
 
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -38,6 +39,7 @@ from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.background import OnResult
 from cosmic.frame.clock import Clock
+from cosmic.frame.config import wrong_values
 from cosmic.frame.declaration import Companion, Declared, command, newest, state, stream
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable, RecordingError
 from cosmic.frame.file_names import NameOption, directory_problem, space_left
@@ -323,8 +325,10 @@ class Daqco(Declared):
         try:
             fields = self.settings.model_dump() | {"rate_hz": rate_hz}
             settings = DaqcoSettings.model_validate(fields)
-        except ValueError as exc:
-            raise ConfigError(f"rate_hz: {rate_hz!r} is not accepted: {exc}") from None
+        except ValidationError as exc:
+            raise ConfigError(
+                f"the sampling rate cannot be set: {wrong_values(exc)}; the old one stays"
+            ) from None
         self.apply(settings)
 
     @command(timeout_s=SLOW_S)
@@ -382,12 +386,17 @@ class Daqco(Declared):
         NotAvailable
             Nothing is acquired, or a recording runs already.
         RecordingError
-            The name, the directory or the disk forbid it, or there is such a file and
-            `overwrite` is False.
+            The name, which ends in .h5, the directory or the disk forbid it, or there is such a
+            file and `overwrite` is False.
         ConfigError
             `before_s` is out of range.
         """
         path = self._file(path, RECORDINGS)
+        if path.suffix.lower() not in RECORDINGS:
+            raise RecordingError(
+                f"{path}: a recording is an HDF5 file whose name ends in .h5; record to "
+                f"{path.stem or 'push'}.h5, and export that to CSV or TDMS afterwards"
+            )
         self._recorder.start(path, overwrite=overwrite, before_s=before_s)
 
     @command(timeout_s=SLOW_S)
@@ -414,12 +423,19 @@ class Daqco(Declared):
 
     @command
     def mark(self, text: str) -> None:
-        """Write a mark into the recording that runs."""
+        """Write a mark into the recording that runs.
+
+        Raises
+        ------
+        NotAvailable
+            Nothing is recorded.
+        """
         self._recorder.mark(text)
 
     @command(reads=True, remembered_s=FOLDER_AGE_S, meanwhile="")
-    def folder_problem(self, directory: str) -> str:
+    def folder_problem(self, directory: str | Path) -> str:
         """Return why nothing can be recorded in `directory`; empty when it can."""
+        directory = os.fspath(directory)
         if not called_remotely() or not directory.strip():
             return directory_problem(directory)
         try:

@@ -290,7 +290,11 @@ class Recorder:
             self._notes.forget(note)
 
     def mark(self, text: str) -> None:
-        """Write a mark with the present time into the recording; nothing where none runs."""
+        """Write a mark with the present time; raises `NotAvailable` where nothing is recorded."""
+        if not self.state.active:
+            raise NotAvailable(
+                f"nothing is recorded, so the mark {text!r} cannot be kept; begin a recording first"
+            )
         self.note("mark", text)
 
     def note(self, kind: str, text: str, channel: str = "") -> None:

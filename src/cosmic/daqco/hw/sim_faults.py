@@ -3,6 +3,8 @@
 from threading import Condition
 from typing import Final
 
+from cosmic.frame.errors import ArgumentError
+
 NAMES: Final = ("unplugged", "reserved", "stalled", "overrun", "no_driver")
 _ONCE: Final = ("overrun",)
 
@@ -32,7 +34,7 @@ class BoardFaults:
         return self._active
 
     def inject(self, name: str, *, board: str | None = None) -> None:
-        """Put the fault `name` in force at one board, or at all; raises `ValueError`."""
+        """Put the fault `name` in force at one board, or at all; raises `ArgumentError`."""
         _check_name(name)
         with self.changed:
             self._active = (*self._active, (name, board))
@@ -63,4 +65,4 @@ class BoardFaults:
 
 def _check_name(name: str) -> None:
     if name not in NAMES:
-        raise ValueError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")
+        raise ArgumentError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")

@@ -526,8 +526,9 @@ class Axis(PlanMovable, Declared):
         ----------
         direction : int
             1 or -1.
-        speed : float
-            In `unit` per second; in Hz for an axis without sensor; configured default if None.
+        speed : float or str
+            In `unit` per second, or such as "5 um/s"; in Hz for an axis without sensor; the
+            configured one if None.
 
         Raises
         ------
@@ -537,11 +538,11 @@ class Axis(PlanMovable, Declared):
         jog = self._platform.jog
         state = self.details
         by_steps = not class_for(state.kind, state.positioner).has_sensor
-        unit = "Hz" if by_steps else state.unit
-        usual = {"um": jog.speed_um_s, "deg": jog.speed_deg_s, "Hz": float(jog.frequency_hz)}
+        unit = "Hz" if by_steps else f"{state.unit}/s"
+        usual = {"um/s": jog.speed_um_s, "deg/s": jog.speed_deg_s, "Hz": float(jog.frequency_hz)}
         wanted = usual[unit] if speed is None else as_number(speed, unit, self._name)
         if direction not in (1, -1) or not 0.0 < wanted <= state.frequency_range_hz[1]:
-            fastest = f"{state.frequency_range_hz[1]:g} {unit if by_steps else f'{unit}/s'}"
+            fastest = f"{state.frequency_range_hz[1]:g} {unit}"
             text = (
                 f"{self._name}: jog in direction 1 or -1 with a speed above 0 and up to {fastest}, "
                 f"not {wanted:g} in direction {direction}"
@@ -556,8 +557,9 @@ class Axis(PlanMovable, Declared):
 
         Parameters
         ----------
-        velocity : float
-            In `unit` per second; in Hz for an axis without sensor. Its sign is the direction.
+        velocity : float or str
+            In `unit` per second, or such as "-5 um/s"; in Hz for an axis without sensor. Its sign
+            is the direction.
         dead_man_s : float
             It stops when nobody renews it for so long, on the wall clock.
         source : str
@@ -570,7 +572,7 @@ class Axis(PlanMovable, Declared):
         """
         state = self.details
         by_steps = not class_for(state.kind, state.positioner).has_sensor
-        wanted = as_number(velocity, "Hz" if by_steps else state.unit, self._name)
+        wanted = as_number(velocity, "Hz" if by_steps else f"{state.unit}/s", self._name)
         if wanted == 0.0:
             text = f"{self._name}: steer at a speed other than 0; end it to stand still"
             raise refusal(refuse(Reason.NOT_FINITE, text, axis=self._name))

@@ -37,7 +37,7 @@ from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.companion import MicoCompanion
-from cosmic.mico.api.entry import Number, as_number, finite, one_line, source_of
+from cosmic.mico.api.entry import Number, as_number, one_line, source_of
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.live_clearance import LiveClearance
@@ -817,7 +817,8 @@ class Mico(Declared):
         UnknownAxisError
             One of them does not exist.
         NotAvailable
-            They are linked already, have no sensor, or are not of one kind, or one of them moves.
+            They are linked already, have no sensor, or are not of one kind, one of them moves, or
+            `ratio` is outside 0.001 to 1000, either way.
         """
         self._check_linkable(first, second)
         self.add_link(first, second, float(ratio))
@@ -827,7 +828,7 @@ class Mico(Declared):
     def add_link(self, first: str, second: str, ratio: float) -> None:
         """Link two axes; raises as `link`."""
         self._check_linkable(first, second)
-        self._manager.links.add(first, second, finite(ratio, "a ratio"))
+        self._manager.links.add(first, second, ratio)
 
     def unlink(self, axis: str) -> bool:
         """Take away every link of an axis; False when it had none.

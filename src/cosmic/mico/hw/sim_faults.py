@@ -7,6 +7,7 @@ from threading import Lock
 from typing import Final, Protocol
 
 from cosmic.frame.clock import Clock
+from cosmic.frame.errors import ArgumentError
 
 NAMES: Final = (
     "unplugged",
@@ -115,14 +116,14 @@ class Faults:
 
         Raises
         ------
-        ValueError
+        ArgumentError
             No such fault, or a delay where none belongs.
         """
         _check_name(name)
         if delay_s is not None and name not in _WITH_DELAY:
-            raise ValueError(f"fault {name!r} has no delay; those with one: {_WITH_DELAY}")
+            raise ArgumentError(f"fault {name!r} has no delay; those with one: {_WITH_DELAY}")
         if delay_s is not None and not 0.0 <= delay_s < 1e6:
-            raise ValueError(f"fault {name!r}: a delay is a finite time in s, got {delay_s!r}")
+            raise ArgumentError(f"fault {name!r}: a delay is a finite time in s, got {delay_s!r}")
         fault = Fault(name, device, channel, 0.5 if delay_s is None else delay_s)
         with self._lock:
             self._active = (*self._active, fault)
@@ -137,7 +138,7 @@ class Faults:
 
         Raises
         ------
-        ValueError
+        ArgumentError
             No such fault.
         """
         if name is not None:
@@ -185,4 +186,4 @@ class Faults:
 
 def _check_name(name: str) -> None:
     if name not in NAMES:
-        raise ValueError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")
+        raise ArgumentError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")

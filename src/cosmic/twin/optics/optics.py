@@ -226,7 +226,8 @@ class Optics:
         each = self.settings.views[view]
         if not (each.lens and (each.zoom_scale or each.zoom_shift_um or each.zoom_focus_um)):
             return STEADY
-        chance = random.Random(f"zoom {self._lens.run_s('zoom', at_s):.6f} {self._seed}")
+        # Not by time, which differs each time a program is run: a seed gives the same again.
+        chance = random.Random(f"zoom {self._lens.run_number('zoom', at_s)} {self._seed}")
         return Wobble(
             1.0 + each.zoom_scale * chance.gauss(0.0, 1.0),
             each.zoom_shift_um * chance.gauss(0.0, 1.0),

@@ -153,9 +153,14 @@ class ImageWait(Operation[SentImage]):
         newest = thread.last
         if newest is not None:
             self._on_image(newest)
+        forget = thread.on_end(self._on_end)
+        self.add_callback(lambda _ended: forget())
 
     def _give_up(self) -> None:
         self.fail(MoveCancelled(f"{self.title}: it is no longer waited for"))
+
+    def _on_end(self) -> None:
+        self.fail(NotAvailable(f"{self.title}: the camera is closed"))
 
     def _on_image(self, image: CameraImage) -> None:
         frame = image.frame

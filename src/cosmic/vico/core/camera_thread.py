@@ -125,6 +125,7 @@ class CameraThread(WorkerThread):
         self._arrived = Condition()
         self._received: Event[CameraImage] = Event()
         self._renewed: Event[[]] = Event()
+        self._ended: Event[[]] = Event()
         self._lock = Lock()
         self._over = False
 
@@ -185,6 +186,13 @@ class CameraThread(WorkerThread):
         """Call `receiver(image)` with every frame, in the camera's thread."""
         return self._received.subscribe(receiver)
 
+    def on_end(self, listener: Callable[[], object]) -> Unsubscribe:
+        """Call `listener()` when the camera is closed for good; at once where it is."""
+        unsubscribe = self._ended.subscribe(listener)
+        if self._over:
+            listener()
+        return unsubscribe
+
     def next_image(self, since_s: float, timeout_s: float) -> CameraImage:
         """Wait for a whole image whose exposure began at `since_s` of platform time or later.
 
@@ -205,6 +213,7 @@ class CameraThread(WorkerThread):
             self._arrived.wait_for(lambda: fresh() or self._over, timeout_s)
             newest = self._newest
         if newest is None or not fresh():
+            self._check_open()
             reason = self._problem or ("it is stopped" if not self._running else "none arrived")
             raise NotAvailable(f"no image of {self.camera_name} in {timeout_s:g} s: {reason}")
         return newest
@@ -260,10 +269,15 @@ class CameraThread(WorkerThread):
         NotAvailable
             Another trigger is in force, or no camera is connected.
         """
+        self._check_open()
         camera = self._camera
         if camera is None:
             raise NotAvailable(f"{self.camera_name}: {self._problem or 'not connected'}")
         camera.trigger()
+
+    def _check_open(self) -> None:
+        if self._over:
+            raise NotAvailable(f"{self.camera_name} is closed")
 
     def _put(self, title: str, command: Command) -> Task:
         task = Task(title)
@@ -291,6 +305,7 @@ class CameraThread(WorkerThread):
             self._refuse_commands("closed")
             with self._arrived:
                 self._arrived.notify_all()
+            self._ended.emit()
 
     def _work(self) -> None:
         """Open the camera and take images until the end, another camera or a failure."""

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from threading import Condition
 from typing import Final
 
+from cosmic.frame.errors import ArgumentError
+
 NAMES: Final = ("unplugged", "taken", "incomplete", "lost", "frozen", "slow")
 
 
@@ -52,7 +54,7 @@ class CameraFaults:
         return self._active
 
     def inject(self, name: str, *, camera: str | None = None, share: float = 1.0) -> None:
-        """Put a fault in force at one camera, or at all; raises `ValueError`.
+        """Put a fault in force at one camera, or at all; raises `ArgumentError`.
 
         Parameters
         ----------
@@ -61,7 +63,7 @@ class CameraFaults:
         """
         _check_name(name)
         if not 0.0 <= share <= 1.0:
-            raise ValueError(f"a part of the frames lies between 0 and 1, got {share!r}")
+            raise ArgumentError(f"a part of the frames lies between 0 and 1, got {share!r}")
         with self.changed:
             self._active = (*self._active, Fault(name, camera, share))
             if name == "unplugged":
@@ -99,4 +101,4 @@ class CameraFaults:
 
 def _check_name(name: str) -> None:
     if name not in NAMES:
-        raise ValueError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")
+        raise ArgumentError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")

@@ -7,6 +7,7 @@ from typing import Final, Protocol
 
 from typing_extensions import override
 
+from cosmic.frame.errors import ArgumentError
 from cosmic.vico.hw.serial_port import SerialLike
 
 NAMES: Final = ("garbage", "lost_bytes", "silent", "unplugged")
@@ -45,13 +46,13 @@ class LineFaults:
         return self._active
 
     def inject(self, name: str) -> None:
-        """Put the fault `name` in force; raises `ValueError`."""
+        """Put the fault `name` in force; raises `ArgumentError`."""
         _check_name(name)
         with self._lock:
             self._active |= {name}
 
     def clear(self, name: str | None = None) -> None:
-        """End the fault `name`, or all; raises `ValueError`."""
+        """End the fault `name`, or all; raises `ArgumentError`."""
         if name is not None:
             _check_name(name)
         with self._lock:
@@ -60,7 +61,7 @@ class LineFaults:
 
 def _check_name(name: str) -> None:
     if name not in NAMES:
-        raise ValueError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")
+        raise ArgumentError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")
 
 
 class SimLine:

@@ -10,6 +10,7 @@ from typing import Final, Protocol
 from typing_extensions import override
 
 from cosmic.frame.clock import Clock
+from cosmic.frame.errors import ArgumentError
 from cosmic.twin.lens import AXES, LensAxisName, TwinLens
 from cosmic.twin.lens_motor import LensPhase
 from cosmic.twin.light import TwinLight
@@ -245,14 +246,14 @@ class PeripheralFaults:
         self._lines = {"lens": lens_line, "light": light_line}
 
     def inject(self, name: str, *, where: str = "lens") -> None:
-        """Put a fault in force at the "lens" or the "light"; raises `ValueError`."""
+        """Put a fault in force at the "lens" or the "light"; raises `ArgumentError`."""
         if name == "lost_steps":
             self._lose(LOST_SHARE)
         else:
             self._line(where).faults.inject(name)
 
     def clear(self, name: str | None = None) -> None:
-        """End the fault `name`, or all, everywhere; raises `ValueError`."""
+        """End the fault `name`, or all, everywhere; raises `ArgumentError`."""
         if name in (None, "lost_steps"):
             self._lose(0.0)
         if name != "lost_steps":
@@ -265,7 +266,7 @@ class PeripheralFaults:
 
     def _line(self, where: str) -> SimLine:
         if where not in self._lines:
-            raise ValueError(f"there is no line {where!r}; known: {', '.join(self._lines)}")
+            raise ArgumentError(f"there is no line {where!r}; known: {', '.join(self._lines)}")
         return self._lines[where]
 
 

@@ -89,7 +89,7 @@ def test_a_sensor_that_weights_pull_keeps_its_sign() -> None:
 def test_a_load_that_is_not_there_is_asked_for_again() -> None:
     calibration = ForceCalibration([weight(2.0, 1.0)])
     calibration.take(0.0, 0.01)
-    with pytest.raises(CalibrationProblem, match="is not to be seen"):
+    with pytest.raises(CalibrationProblem, match=r"not to be seen: .* µN instead of .* µN\."):
         calibration.take(0.05, 0.01)
     with pytest.raises(CalibrationProblem, match="no force was read"):
         calibration.take(math.nan, 0.01)

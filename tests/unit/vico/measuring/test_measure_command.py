@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import re
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -61,18 +62,24 @@ def test_pages_that_cannot_be_measured_do_not_cost_the_others(
     assert "## Pages and parts refused" in (out / "report.md").read_text(encoding="utf-8")
 
 
-def test_ctrl_c_keeps_what_was_measured(
-    image: Path, out: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(("one", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_what_ends_it_keeps_what_was_measured(
+    image: Path,
+    out: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    one: signal.Signals,
+    code: int,
 ) -> None:
     tifffile.imwrite(image.parent / "b.tif", np.stack([IMAGE] * 3), photometric="minisblack")
 
     def until_third(page: FileImage, size: float | None = None) -> Measurement:
         if page.name == "b.tif page 2":
-            raise KeyboardInterrupt
+            signal.raise_signal(one)
         return measure_page(page, size)
 
     monkeypatch.setattr(command, "measure_page", until_third)
-    assert main(["measure", str(image.parent), "--output", str(out)]) == 130
+    assert main(["measure", str(image.parent), "--output", str(out)]) == code
     assert [row["image"] for row in rows_of(out / "fibres.csv")] == ["a.png", "b.tif page 1"]
     assert (out / "report.md").exists()
     assert "interrupted at file 2 of 2" in capsys.readouterr().err

@@ -268,7 +268,7 @@ class Corrections:
         if not 0.0 < width < most:
             raise ConfigError(
                 f"corrections: a fibre is wider than 0 and narrower than the image, {most} px, not "
-                f"{width_px!r}"
+                f"{width_px!r} px"
             )
         return width
 

@@ -1,6 +1,7 @@
 """Find the tips of grippers and of the probe near where the stages say they are."""
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -38,6 +39,9 @@ BROADER: Final = 0.02
 BROAD_STD_PX: Final = 0.4
 """Of an inner corner that is reckoned from the outer one: how broad a jaw looks is not exact."""
 ROUGHER: Final = 2.0
+ONE_SIDED: Final = 4.0
+"""A side of a probe that is so much rougher than the other; noise makes less than 2."""
+ROUGH_STD_PX: Final = 0.1
 LARGEST_STEP_PX: Final = 1.5
 
 
@@ -52,7 +56,10 @@ def find_probe(image: Pixels, expected: ExpectedTool) -> ToolEnd | NotSeen:
     body = _body(frame, greys, blob, expected)
     if isinstance(body, NotSeen):
         return body
-    return _tool_end(frame, body, expected, inner_is_high=False)
+    end = _tool_end(frame, body, expected, inner_is_high=False)
+    if expected.shut or not _touched(body):
+        return end
+    return replace(end, doubts=(*end.doubts, "something lies against a side of it"))
 
 
 def find_shut_gripper(image: Pixels, expected: ExpectedTool) -> GripperTips | NotSeen:
@@ -221,6 +228,12 @@ def _step(first: Body, second: Body) -> float:
     lean = 0.25 * sum(side.slope for body in (first, second) for side in (body.low, body.high))
     across = second.front.middle - first.front.middle
     return second.front.offset - first.front.offset + lean * across
+
+
+def _touched(body: Body) -> bool:
+    """Return whether something lies against one side of a probe, which moves that side."""
+    smooth, rough = sorted((body.low.std, body.high.std))
+    return rough > max(ONE_SIDED * smooth, ROUGH_STD_PX)
 
 
 def _rougher(one: Line, other: Line) -> bool:
