@@ -131,9 +131,9 @@ class FibreSettings(StrictModel):
     orientation_deg, twist_deg_mm : float
         By how much the section is turned in the plane of bending, at the first end and along
         the fibre; 0 bends flat way.
-    round : bool
-        As stiff in all planes, it is as thick in each of them as it looks wide from above; else
-        `thickness_um`.
+    thick_as_wide : bool
+        Bent, it is as thick in the plane of bending as it looks wide, which one that is as stiff in
+        all planes should be; else `thickness_um`. A ribbon always is.
     shear_ratio : float
         Modulus along the fibre over that of shear; 0: it does not shear.
     relaxation_per_decade : float
@@ -175,7 +175,7 @@ class FibreSettings(StrictModel):
     plane_ratio: float = Field(default=1.0, ge=1.0, le=100.0)
     orientation_deg: float = 0.0
     twist_deg_mm: float = 0.0
-    round: bool = False
+    thick_as_wide: bool = False
     shear_ratio: float = Field(default=0.0, ge=0.0)
     relaxation_per_decade: float = Field(default=0.0, ge=0.0, le=0.3)
     yield_strain: float = Field(default=1.0, gt=0.0)

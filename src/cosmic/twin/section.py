@@ -121,7 +121,7 @@ class Section:
         """Return how far it reaches in the plane of bending."""
         width, thick = self._settings.width_um, self._settings.thickness_um
         if self._settings.plane_ratio <= 1.0:
-            return width if self._settings.round else thick
+            return width if self._settings.thick_as_wide else thick
         angle = self._angle_at_rad(at_um, roll_rad)
         return math.hypot(thick * math.cos(angle), width * math.sin(angle))
 

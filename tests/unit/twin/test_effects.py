@@ -153,7 +153,7 @@ def test_shear_counts_where_spans_are_short() -> None:
 
 def test_a_round_fibre_shears_as_one_as_thick_as_it_looks() -> None:
     flat = lever_fit(with_fibre(shear_ratio=12.0))
-    round_one = lever_fit(with_fibre(shear_ratio=12.0, round=True))
+    round_one = lever_fit(with_fibre(shear_ratio=12.0, thick_as_wide=True))
     assert abs(flat.ei_off - PLAIN.ei_off) < 0.005, "8 um thick it hardly shears"
     assert round_one.clamp_um > flat.clamp_um + 3.0
 

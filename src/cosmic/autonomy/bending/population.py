@@ -9,6 +9,8 @@ fibre is then assessed by what the others say.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 from typing import Final
 
 import numpy as np
@@ -171,24 +173,41 @@ def _shared(
 ) -> tuple[Common, list[Common]]:
     """Return what is common by all, and by all but each."""
     precision = np.linalg.inv(prior.covariance)
-    total, pulled = precision.copy(), precision @ prior.mean
-    said = []
-    for read, of, weight in zip(readings, assessed, weights, strict=True):
-        own, pull = np.zeros_like(total), np.zeros_like(pulled)
-        if read.certified is not None or _teaches(of):
-            own, pull = _says(read, of, weight, settings)
-        said.append((own, pull))
-        if read.certified is None:
-            total, pulled = total + own, pulled + pull
-    for of_one in _of_one_certificate(readings, assessed, weights, settings):
-        total, pulled = total + of_one[0], pulled + of_one[1]
+    total, pulled = precision, precision @ prior.mean
+    of_each = [(np.zeros_like(total), np.zeros_like(pulled))] * len(readings)
+    for numbers, std in _with_one_error(readings, assessed):
+        said = [_Said.of(readings[n], assessed[n], weights[n], settings) for n in numbers]
+        own, pull = reduce(add, said).with_unknown(std)
+        total, pulled = total + own, pulled + pull
+        for at, number in enumerate(numbers):
+            of_each[number] = own, pull
+            if others := said[:at] + said[at + 1 :]:
+                left, rest = reduce(add, others).with_unknown(std)
+                of_each[number] = own - left, pull - rest
 
-    def solved(own: Floats, pull: Floats) -> Common:
+    def without(own: Floats, pull: Floats) -> Common:
         covariance = np.asarray(np.linalg.inv(total - own), dtype=np.float64)
         return Common(np.asarray(covariance @ (pulled - pull)), covariance)
 
     none = np.zeros_like(total), np.zeros_like(pulled)
-    return solved(*none), [solved(*each) for each in said]
+    return without(*none), [without(*each) for each in of_each]
+
+
+def _with_one_error(
+    readings: Sequence[Readings], assessed: Sequence[Assessed]
+) -> list[tuple[list[int], float]]:
+    """Return the numbers of those whose ln(EI) is off by one and the same, and by how much it may.
+
+    Standards with one certificate are; nothing is known of that of a fibre.
+    """
+    found: dict[tuple[float, float], list[int]] = {}
+    alone: list[tuple[list[int], float]] = []
+    for number, (read, one) in enumerate(zip(readings, assessed, strict=True)):
+        if read.certified is not None:
+            found.setdefault(read.certified, []).append(number)
+        elif _teaches(one):
+            alone.append(([number], math.inf))
+    return [*alone, *((numbers, std) for (_, std), numbers in found.items())]
 
 
 def said_alone(read: Readings, settings: FitSettings) -> tuple[Floats, Floats]:
@@ -278,20 +297,3 @@ class _Said:
         precision = self.ei_precision + std**-2 if std > 0.0 else math.inf
         left = self.precision - np.outer(self.by_ei, self.by_ei) / precision
         return np.asarray(left), np.asarray(self.pull - self.by_ei * self.ei_pull / precision)
-
-
-def _of_one_certificate(
-    readings: Sequence[Readings],
-    assessed: Sequence[Assessed],
-    weights: Sequence[Floats],
-    settings: FitSettings,
-) -> list[tuple[Floats, Floats]]:
-    """Return what standards say, those with one certificate together: its error is one for all."""
-    said: dict[tuple[float, float], _Said] = {}
-    for read, of, weight in zip(readings, assessed, weights, strict=True):
-        if read.certified is None:
-            continue
-        one = _Said.of(read, of, weight, settings)
-        before = said.get(read.certified)
-        said[read.certified] = one if before is None else before + one
-    return [each.with_unknown(std) for (_, std), each in said.items()]

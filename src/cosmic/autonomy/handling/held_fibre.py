@@ -29,6 +29,8 @@ class HeldFibre:
         How far aside of the middle this try grasps.
     zero_un : float or None
         The force without contact.
+    nearer : bool
+        A standard that was not met far from the jaws: it is pushed where fibres are.
     tilts : int
         How often it was held at another height because it was not met.
     looks : int
@@ -65,6 +67,7 @@ class HeldFibre:
     held: bool = False
     contacts: list[Contact] = field(default_factory=list)
     zero_un: float | None = None
+    nearer: bool = False
     tilts: int = 0
     looks: int = 0
     ei_guess_n_m2: float | None = None

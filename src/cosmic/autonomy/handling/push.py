@@ -548,13 +548,13 @@ class PushSpans(FibreOperation):
 def span_limits(work: HandlingContext) -> SpanLimits:
     """Return what spans there may be; shorter ones for a fibre that points up or down."""
     push, fibre = work.settings.push, work.held_fibre()
-    longest, stroke = push.spans.longest_um, push.spans.longest_stroke_um
-    if fibre.standard:
-        longest = max(longest, work.settings.standard.longest_um)
-        stroke = max(stroke, push.spans.stroke_part * longest)
+    ours = work.settings.standard if fibre.standard else push.spans
+    longest = min(ours.longest_um, push.spans.longest_um) if fibre.nearer else ours.longest_um
     if fibre.tilts:
         longest = min(longest, push.tilt_longest_um)
-    return push.spans.model_copy(update={"longest_um": longest, "longest_stroke_um": stroke})
+    return push.spans.model_copy(
+        update={"longest_um": longest, "longest_stroke_um": ours.longest_stroke_um}
+    )
 
 
 def fit_settings(work: HandlingContext, fibre: HeldFibre) -> FitSettings:
@@ -608,7 +608,8 @@ def certificate_of(standard: StandardSettings) -> Certificate:
 class StepBack(FibreOperation):
     """The probe goes back before the fibre is pushed again, if it is still in the jaws.
 
-    One that was not met may point up or down: it is held lower then, and higher the next time.
+    One that was not met may point up or down: it is held lower then, and higher the next time. A
+    standard is first tried where fibres are pushed: nearer, the same tilt still meets the probe.
     """
 
     name = "step back"
@@ -617,7 +618,11 @@ class StepBack(FibreOperation):
     def steps(self, work: HandlingContext) -> Steps:
         fibre, push = work.held_fibre(), work.settings.push
         _, failure = work.failures[-1]
-        fibre.tilts += failure.cause == NO_CONTACT
+        if failure.cause == NO_CONTACT:
+            if fibre.standard and not fibre.nearer:
+                fibre.nearer = True
+            else:
+                fibre.tilts += 1
         x, y = work.tip_now(work.probe)
         back = push.stand_off_um + push.search_um
         yield work.go(work.at(work.probe, x, y - back * (1.0 if work.probe.forward[1] > 0 else -1)))

@@ -257,9 +257,10 @@ class StandardSettings(StrictModel):
     length_um, width_um : float
         By the length it is known on the plate; by the width it slides on the probe, shears and is
         strained.
-    longest_um : float
-        Farthest position of the probe from the jaws: farther than that of fibres, as a standard is
-        straight, and far out neither the clamp nor what gives way can be taken for its stiffness.
+    longest_um, longest_stroke_um : float
+        Farthest position of the probe from the jaws, and longest push: more than those of fibres,
+        as a standard is straight, and far out neither the clamp nor what gives way can be taken for
+        its stiffness.
     x_um, y_um, within_um : float
         Where its middle lies on a plate that is put on, and how far from there it is looked for.
     at : tuple of str
@@ -272,6 +273,7 @@ class StandardSettings(StrictModel):
     length_um: float = Field(2000.0, gt=0.0)
     width_um: float = Field(15.0, gt=0.0)
     longest_um: float = Field(900.0, gt=0.0)
+    longest_stroke_um: float = Field(90.0, gt=0.0)
     x_um: float = 0.0
     y_um: float = -3900.0
     within_um: float = Field(800.0, gt=0.0)

@@ -95,9 +95,9 @@ def one_fibre(settings: HandlingSettings, treated: Part[HandlingContext]) -> Par
     )
 
 
-def measured() -> Part[HandlingContext]:
+def measured(pushes: int = PUSHES) -> Part[HandlingContext]:
     """Return the measurement of a fibre that is held before the probe."""
-    pushed = Retry(PushSpans(), PUSHES, only={NO_CONTACT}, between=StepBack())
+    pushed = Retry(PushSpans(), pushes, only={NO_CONTACT}, between=StepBack())
     return Retry(
         Sequence("measure", pushed, FitSpans()),
         MEASUREMENTS,
@@ -163,7 +163,7 @@ def one_standard(
         ),
         Fallback(
             "the standard",
-            Sequence("bend it", Turn(), grasped(settings), carry, measured()),
+            Sequence("bend it", Turn(), grasped(settings), carry, measured(PUSHES + 1)),
             NoteFailure(),
         ),
         back,

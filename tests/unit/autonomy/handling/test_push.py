@@ -9,11 +9,18 @@ import pytest
 from typing_extensions import override
 
 from cosmic.autonomy.bending.fit import fit_bending
+from cosmic.autonomy.handling import push
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Reach
-from cosmic.autonomy.handling.push import NO_CONTACT, TOO_HIGH, PushSpans
+from cosmic.autonomy.handling.push import (
+    NO_CONTACT,
+    TOO_HIGH,
+    PushSpans,
+    StepBack,
+    span_limits,
+)
 from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps
 from cosmic.daqco.core.settings import LimitSettings
@@ -127,7 +134,13 @@ class Bench(HandlingContext):
     """A fibre in the jaws, a probe, and the force of one on the other; no platform."""
 
     def __init__(
-        self, ei_n_m2: float, *, off_um: float = 0.0, tilt: float = 0.0, there: bool = True
+        self,
+        ei_n_m2: float,
+        *,
+        off_um: float = 0.0,
+        tilt: float = 0.0,
+        there: bool = True,
+        length_um: float = 1200.0,
     ) -> None:
         clock = ManualClock(auto_advance=True)
         settings = HandlingSettings(push=PushSettings(stop_un=140.0))
@@ -147,9 +160,10 @@ class Bench(HandlingContext):
         self.reach_um, self.lost = math.inf, False
         self.listeners, self.felt_un, self.frequency_hz = list[Any](), ZERO_UN, 0.0
         self.peak_un, self.random = 0.0, np.random.default_rng(3)
-        line = np.column_stack([np.linspace(0.0, 1200.0, 61), np.zeros(61)])
-        reach = Reach(Candidate(line, 1200.0, WIDTH_UM, 0.0, 60.0), 0.0, line, (250.0, 0.0))
-        self.fibre = HeldFibre(1, reach, inside_um=250.0, free_um=950.0, held=True)
+        line = np.column_stack([np.linspace(0.0, length_um, 61), np.zeros(61)])
+        reach = Reach(Candidate(line, length_um, WIDTH_UM, 0.0, 60.0), 0.0, line, (250.0, 0.0))
+        self.free_um = length_um - 250.0
+        self.fibre = HeldFibre(1, reach, inside_um=250.0, free_um=self.free_um, held=True)
 
     def __getitem__(self, name: str) -> Axis:
         return Axis(self, name)
@@ -188,7 +202,7 @@ class Bench(HandlingContext):
         ahead = self.at_um["probe.x"] - 0.0
         surface = self.at_um["left.y"] + WIDTH_UM / 2.0 + self.off_um + self.tilt * ahead
         way = surface - (5000.0 + self.at_um["probe.y"])
-        if not (self.there and not self.lost and way > 0.0 and 0.0 < ahead < 950.0):
+        if not (self.there and not self.lost and way > 0.0 and 0.0 < ahead < self.free_um):
             return 0.0
         fibre = 3.0 * self.ei / (ahead + CLAMP_UM) ** 3
         fibre *= self.stiffer if ahead < 400.0 else 1.0
@@ -253,17 +267,41 @@ def test_the_standard_is_round_and_is_not_slid():
     assert bench.heights_um == []
 
 
-@pytest.mark.parametrize(("standard", "farthest_um"), [(False, 600.0), (True, 870.0)])
-def test_the_standard_is_bent_farther_from_the_jaws_than_fibres(standard: bool, farthest_um: float):
-    bench = Bench(1.8e-10)
-    fibre = bench.held_fibre()
-    fibre.standard = standard
+def places_um(bench: Bench) -> list[float]:
+    """Return where a fibre was pushed, from the jaws."""
     carried_out(PushSpans().run(bench))
-    places = [each.nominal_um for each in fibre.spans]
+    return [each.nominal_um for each in bench.held_fibre().spans]
+
+
+@pytest.mark.parametrize(("longest_um", "farthest_um"), [(900.0, 900.0), (400.0, 400.0)])
+def test_the_standard_is_bent_as_far_out_as_its_own_settings_say(
+    longest_um: float, farthest_um: float
+):
+    bench = Bench(1.8e-10, length_um=2000.0)
+    beam = bench.settings.standard.model_copy(update={"longest_um": longest_um})
+    bench.settings = bench.settings.model_copy(update={"standard": beam})
+    assert places_um(bench)[0] == pytest.approx(600.0, abs=5.0), "where fibres are pushed"
+    bench.held_fibre().standard = True
+    places = places_um(bench)
     assert places[0] == pytest.approx(farthest_um, abs=5.0)
     assert places[-1] < 300.0
-    forces = [float(np.ptp(each.force_un)) for each in fibre.spans]
-    assert min(forces) > (40.0 if standard else 15.0), "far out it is bent by as much more"
+    assert np.ptp(bench.held_fibre().spans[0].force_un) > 55.0, "by as much more, far out"
+
+
+def test_a_standard_that_is_not_met_far_out_is_tried_where_fibres_are_before_it_is_tilted(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    bench = Bench(1.8e-10, length_um=2000.0)
+    fibre = bench.held_fibre()
+    fibre.standard = True
+    tried: list[tuple[float, int]] = []
+    for _ in range(4):
+        tried.append((span_limits(bench).longest_um, fibre.tilts))
+        not_met = OperationFailed(NO_CONTACT, "the probe met nothing")
+        bench.failures.append(("push the spans", not_met))
+        monkeypatch.setattr(push, "see_held", lambda *_: iter(()))
+        carried_out(StepBack().run(bench))
+    assert tried == [(900.0, 0), (600.0, 0), (330.0, 1), (330.0, 2)]
 
 
 def test_the_standard_is_bent_as_its_own_diameter_bears_and_not_as_wide_as_it_looks():
