@@ -9,8 +9,10 @@ from contract.station_rig import free_port, wait_until
 from contract.test_gateway_epics import Client
 from cosmic.app.configuration.gateways import EpicsSettings
 from cosmic.app.gateways.epics import EpicsGateway
+from cosmic.app.gateways.plain import from_json
 from cosmic.app.gateways.session import GatewaySession
 from cosmic.app.platform import build_platform
+from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.errors import CallRefused
 from cosmic.frame.network.host import Host
@@ -70,3 +72,13 @@ def test_a_motion_that_names_nothing_is_no_motion() -> None:
         with pytest.raises(CallRefused, match="kind"):
             session.order("mico", "axes.begin", {"motion": {}}, ("left.x",))
         session.close()
+
+
+def test_what_does_not_fit_an_object_is_named_in_plain_words() -> None:
+    with pytest.raises(CallRefused) as refused:
+        from_json({"low": "x", "nonsense": 1}, LimitSettings)
+    text = str(refused.value)
+    assert "channel: key is missing" in text
+    assert "low should be a valid number, not 'x'" in text
+    assert "nonsense: unknown key; is it misspelt?" in text
+    assert "pydantic" not in text

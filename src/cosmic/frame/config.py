@@ -114,6 +114,8 @@ def _wrong(item: ErrorDetails) -> str:
     reason = _reason(item["type"], item["msg"])
     if item["type"] == "value_error" or not item["loc"]:
         return reason
+    if item["type"] in {"missing", "extra_forbidden"}:
+        return f"{_key(item['loc'])}: {reason}"
     return f"{_key(item['loc'])} {reason.removeprefix('Input ')}, not {item['input']!r}"
 
 

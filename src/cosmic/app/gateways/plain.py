@@ -13,7 +13,7 @@ from typing import Any, Final, Literal, Union, get_args, get_origin, get_type_hi
 import numpy as np
 from pydantic import ValidationError
 
-from cosmic.frame.config import StrictModel
+from cosmic.frame.config import StrictModel, wrong_values
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.network.errors import CallRefused
 
@@ -192,7 +192,7 @@ def _of_class(value: object, kind: Any) -> object:
             return kind.model_validate(value)
         return _data(value, kind)
     except ValidationError as exc:
-        raise CallRefused(f"no {_said(kind)}: {exc}"[:1000]) from exc
+        raise CallRefused(f"no {_said(kind)}: {wrong_values(exc)}"[:1000]) from exc
     except (TypeError, ValueError, CosmicError) as exc:
         raise CallRefused(f"no {_said(kind)}: {exc}"[:1000]) from exc
 
