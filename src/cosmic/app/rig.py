@@ -181,9 +181,9 @@ class Rig:
         NotAvailable
             An application is not hosted here, something runs, or the platform is closed.
         """
+        self._check_open()
         from cosmic.app.procedures import campaign_on  # loads statistics, which takes a second
 
-        self._check_open()
         handling = self._shared.handling
         if handling is not None and handling.running:
             raise NotAvailable("an operation on a fibre is running; wait until it has ended")
@@ -231,9 +231,9 @@ class Rig:
         ConfigError
             The platform has not what `settings` names, or there is no such calibration.
         """
+        self._check_open()
         from cosmic.app.procedures import calibration_on
 
-        self._check_open()
         if other := self.running:
             raise NotAvailable(f"{other} is running; end it first")
         procedure, work = calibration_on(self, settings, anew, zooms=zooms)
