@@ -19,7 +19,7 @@ from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun, RunState
 from cosmic.daqco.api.daqco import Daqco, daqco_of
-from cosmic.frame.arguments import checked_class
+from cosmic.frame.arguments import check_named, checked_class
 from cosmic.frame.errors import NotAvailable
 from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.vico.api.vico import Vico, vico_of
@@ -177,7 +177,7 @@ class Rig:
         CampaignError
             The folder holds another campaign, is in use, or cannot be written.
         ArgumentError
-            `folder` is empty, or no file can be called so.
+            `recipe` or `folder` is empty, or no file can be called so.
         NotAvailable
             An application is not hosted here, something runs, or the platform is closed.
         """
@@ -288,9 +288,12 @@ class Rig:
         ------
         ConfigError
             The file cannot be read, or a step cannot be carried out here.
+        ArgumentError
+            `folder` is empty, or no file can be called so.
         NotAvailable
             Something else runs, or no fibre is seen.
         """
+        check_named("folder", folder)
         from cosmic.autonomy.recorded.operations import Surroundings
         from cosmic.autonomy.recorded.replay import mark_one, replay_on
         from cosmic.autonomy.recorded.steps import RecordedProcedure, load_recorded
