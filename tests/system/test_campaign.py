@@ -13,6 +13,7 @@ from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.recipe import OutputSettings
 from cosmic.autonomy.campaign.records import CampaignError, Outcome
 from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.autonomy.recorded.steps import RecordedProcedure
 from cosmic.frame.errors import ArgumentError, ConfigError
 from cosmic.twin.truth import TruthRecord, read_truth
 from system.campaign_bench import Bench, bench
@@ -151,6 +152,10 @@ def test_a_folder_without_a_name_is_refused(
     for empty in ("", " "):
         with pytest.raises(ArgumentError, match="folder is empty; give one by name"):
             rig.campaign(recipe(home, 1), empty)
+        with pytest.raises(ArgumentError, match="recipe is empty; give one by name"):
+            rig.campaign(empty, home / "never")
+        with pytest.raises(ArgumentError, match="folder is empty; give one by name"):
+            rig.replay(RecordedProcedure(name="nothing"), folder=empty)
     assert not list(here.iterdir())
 
 

@@ -18,8 +18,8 @@ from cosmic.autonomy.handling.plate_change import PlateHandler
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.shipped.calibrate import build_calibrate, calibration_names
-from cosmic.frame.arguments import check_path, checked
-from cosmic.frame.errors import ArgumentError, ConfigError, NotAvailable
+from cosmic.frame.arguments import check_named, checked
+from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.version import __version__
 from cosmic.vico.api.application import VicoApplication
 
@@ -36,9 +36,7 @@ def campaign_on(
     """Return a campaign that is ready to start; see `Rig.campaign`."""
     for name, value in (("recipe", recipe), ("folder", folder)):
         if not isinstance(value, Recipe):
-            check_path(name, value)
-            if not str(value).strip():
-                raise ArgumentError(f"{name} is empty; give one by name, such as 'out'")
+            check_named(name, value)
     if plates is None and platform.scene is not None:
         plates = TwinPlates(platform.scene, platform.clock)
     read = recipe if isinstance(recipe, Recipe) else read_recipe(Path(recipe))

@@ -19,7 +19,7 @@ from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun, RunState
 from cosmic.daqco.api.daqco import Daqco, daqco_of
-from cosmic.frame.arguments import checked_class
+from cosmic.frame.arguments import check_named, checked_class
 from cosmic.frame.errors import NotAvailable
 from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.vico.api.vico import Vico, vico_of
@@ -177,13 +177,13 @@ class Rig:
         CampaignError
             The folder holds another campaign, is in use, or cannot be written.
         ArgumentError
-            `folder` is empty, or no file can be called so.
+            `recipe` or `folder` is empty, or no file can be called so.
         NotAvailable
             An application is not hosted here, something runs, or the platform is closed.
         """
+        self._check_open()
         from cosmic.app.procedures import campaign_on  # loads statistics, which takes a second
 
-        self._check_open()
         handling = self._shared.handling
         if handling is not None and handling.running:
             raise NotAvailable("an operation on a fibre is running; wait until it has ended")
@@ -231,9 +231,9 @@ class Rig:
         ConfigError
             The platform has not what `settings` names, or there is no such calibration.
         """
+        self._check_open()
         from cosmic.app.procedures import calibration_on
 
-        self._check_open()
         if other := self.running:
             raise NotAvailable(f"{other} is running; end it first")
         procedure, work = calibration_on(self, settings, anew, zooms=zooms)
@@ -288,9 +288,12 @@ class Rig:
         ------
         ConfigError
             The file cannot be read, or a step cannot be carried out here.
+        ArgumentError
+            `folder` is empty, or no file can be called so.
         NotAvailable
             Something else runs, or no fibre is seen.
         """
+        check_named("folder", folder)
         from cosmic.autonomy.recorded.operations import Surroundings
         from cosmic.autonomy.recorded.replay import mark_one, replay_on
         from cosmic.autonomy.recorded.steps import RecordedProcedure, load_recorded

@@ -114,6 +114,19 @@ def check_path(name: str, path: str | Path) -> None:
         raise ArgumentError(f"{name}: {str(path)[:80]!r} can be no file ({why})") from exc
 
 
+def check_named(name: str, path: str | Path) -> None:
+    """Refuse what no file can be called, and no name at all: that is the working directory.
+
+    Raises
+    ------
+    ArgumentError
+        It is empty, or can be no file; the text has the name of the argument.
+    """
+    check_path(name, path)
+    if not str(path).strip():
+        raise ArgumentError(f"{name} is empty; give one by name, such as 'out'")
+
+
 def _taken(check: Check, name: str, value: object, function: Callable[..., object]) -> object:
     try:
         return check(value)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 
 from cosmic.frame.clock import Clock
+from cosmic.frame.errors import ArgumentError
 from cosmic.twin.force_side import ForceSide
 from cosmic.twin.lens import TwinLens
 from cosmic.twin.light import TwinLight
@@ -22,7 +23,7 @@ class LastingFaults:
 
     Raises
     ------
-    ValueError
+    ArgumentError
         There is no such tool, axis or sensor, or too much was asked for.
     """
 
@@ -60,7 +61,9 @@ class LastingFaults:
         named = [fault.tool] if fault.tool else tools
         for name in named:
             if name not in tools:
-                raise ValueError(f"tip_bent: there is no tool {name!r}; known: {', '.join(tools)}")
+                raise ArgumentError(
+                    f"tip_bent: there is no tool {name!r}; known: {', '.join(tools)}"
+                )
             amount = BENT_UM if fault.amount is None else fault.amount
             self._force_side.offsets.bend(name, (amount if begins else 0.0, 0.0, 0.0))
 
@@ -69,7 +72,7 @@ class LastingFaults:
         named = [fault.tool] if fault.tool else without
         for name in named:
             if name not in without:
-                raise ValueError(
+                raise ArgumentError(
                     f"steps_lost: {name!r} is no stage without a sensor; known: "
                     f"{', '.join(without)}"
                 )
@@ -81,7 +84,7 @@ class LastingFaults:
         for name in named:
             if name not in sensors:
                 known = ", ".join(sensors)
-                raise ValueError(f"{fault.name}: there is no sensor {name!r}; known: {known}")
+                raise ArgumentError(f"{fault.name}: there is no sensor {name!r}; known: {known}")
             if fault.name == "sensor_saturated":
                 sensors[name].saturated = begins
             elif fault.name == "sensor_dead":
@@ -94,5 +97,5 @@ class LastingFaults:
 def _part(fault: TwinFault, usual: float) -> float:
     part = usual if fault.amount is None else fault.amount
     if not (math.isfinite(part) and 0.0 <= part <= 1.0):
-        raise ValueError(f"{fault.name}: amount is a part, 0 to 1, got {part!r}")
+        raise ArgumentError(f"{fault.name}: amount is a part, 0 to 1, got {part!r}")
     return part

@@ -205,6 +205,24 @@ def test_a_campaign_that_is_refused_writes_no_log_into_the_folder_of_another(
     assert not (out / "cosmic.log").exists()
 
 
+def test_a_folder_without_a_name_is_refused_before_anything_begins(
+    recipe: Path,
+    tmp_path: Path,
+    platforms: SimpleNamespace,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    with pytest.raises(SystemExit) as ended:
+        main(["campaign", str(recipe), "--out", ""])
+    assert ended.value.code == 2
+    assert "--out: is empty; name a file or a folder" in capsys.readouterr().err
+    assert platforms.seeds == []
+    assert not list(here.iterdir())
+
+
 @pytest.mark.parametrize("command", ["calibrate", "repair"])
 def test_a_flood_of_warnings_is_folded_by_every_command_without_a_window(
     command: str,

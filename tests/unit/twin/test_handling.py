@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cosmic.frame.errors import CosmicError
 from cosmic.twin.fate import draw_fate
 from cosmic.twin.fibre_state import FibreState
 from cosmic.twin.settings import TwinSettings, shipped_settings
@@ -339,9 +340,11 @@ def test_faults_that_make_no_sense_are_refused() -> None:
         ("light_dimmed", {"amount": 3.0}),
         ("tip_bent", {"tool": "hammer"}),
         ("steps_lost", {"tool": "left.x"}),
+        ("steps_lost", {"amount": 1.5}),
         ("sensor_drift", {"tool": "nose"}),
         ("sensor_drift", {"amount": math.nan}),
     ):
-        with pytest.raises(ValueError, match=name):
+        with pytest.raises(ValueError, match=name) as refused:
             faults.inject(name, **how)  # type: ignore[arg-type]
+        assert isinstance(refused.value, CosmicError), name
     assert faults.active == ()

@@ -176,6 +176,17 @@ def test_a_probe_is_doubted_that_a_thin_fibre_lies_against() -> None:
         assert found.doubts == ("something lies against a side of it",)
 
 
+@pytest.mark.parametrize("specks", [0, 25, 60])
+@pytest.mark.parametrize("blur", [1.5, 3.0, 6.0])
+@pytest.mark.parametrize("width", [10.0, 23.0, 45.0])
+def test_nothing_is_said_to_lie_against_a_clean_probe(
+    width: float, blur: float, specks: int
+) -> None:
+    for seed in range(20):
+        found = probe(tool_image(seed, width=width, blur=blur, specks=specks))
+        assert not [each for each in found.doubts if "lies against" in each], seed
+
+
 def test_a_jaw_whose_front_is_hidden_is_doubted() -> None:
     image = tool_image(6, gap=80.0, off_px=0.0)
     x, y = image.forward

@@ -290,12 +290,21 @@ class Recorder:
             self._notes.forget(note)
 
     def mark(self, text: str) -> None:
-        """Write a mark with the present time; raises `NotAvailable` where nothing is recorded."""
-        if not self.state.active:
-            raise NotAvailable(
-                f"nothing is recorded, so the mark {text!r} cannot be kept; begin a recording first"
-            )
-        self.note("mark", text)
+        """Write a mark with the present time.
+
+        Raises
+        ------
+        NotAvailable
+            Nothing is recorded, the file is being closed, or writing has failed; the text says so.
+        """
+        writer = self._writer
+        if self._add_event("mark", text, self._application.clock.now_s()):
+            return
+        failed = self._failure or (str(writer.error) if writer and writer.error else "")
+        why = f"the recording has ended ({failed})" if failed else "nothing is recorded"
+        if not failed and (writer or self._closing) is not None:
+            why = "the recording is being closed"
+        raise NotAvailable(f"{why}, so the mark {text!r} cannot be kept; begin a recording first")
 
     def note(self, kind: str, text: str, channel: str = "") -> None:
         """Write an event of any kind with the present time; nothing where nothing is recorded."""
@@ -370,11 +379,13 @@ class Recorder:
         sample: int = -1,
         channel: str = "",
         value: float = float("nan"),
-    ) -> None:
+    ) -> bool:
+        """Return whether it will be written."""
         writer = self._writer
-        if writer is not None:
-            at = self._application.buffer.samples if sample < 0 else sample
-            writer.add_event(RecordedEvent(time_s, at, kind, text, channel, value))
+        if writer is None:
+            return False
+        at = self._application.buffer.samples if sample < 0 else sample
+        return writer.add_event(RecordedEvent(time_s, at, kind, text, channel, value))
 
     def _on_recorded(self, stats: RecordingStats) -> None:
         self._stats = stats

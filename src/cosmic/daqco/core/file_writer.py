@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
-from threading import Event
+from threading import Event, Lock
 from typing import Final
 
 from PySide6.QtCore import Signal
@@ -121,6 +121,8 @@ class UDaqFileWriter(WorkerThread):
         self._given = 0  # written by the thread that acquires alone
         self._taken = 0  # written by this thread alone
         self._refused = False
+        self._ending = False
+        self._taking = Lock()  # nothing that counts as taken comes after the end in the queue
         self._error: CosmicError | None = None
         self._ended = False
 
@@ -144,7 +146,8 @@ class UDaqFileWriter(WorkerThread):
         if self._ended or self._refused:
             return
         if self.backlog + chunk.samples > self._limit:
-            self._refused = True
+            with self._taking:
+                self._refused = True
             waiting_s = self.backlog / self._header.rate_hz
             self._fail(
                 RecordingError(
@@ -161,10 +164,13 @@ class UDaqFileWriter(WorkerThread):
         if self.backlog >= self._enough and not self._wake.is_set():
             self._wake.set()
 
-    def add_event(self, event: RecordedEvent) -> None:
-        """Have `event` written; returns at once. Any thread."""
-        if not (self._ended or self._refused):
+    def add_event(self, event: RecordedEvent) -> bool:
+        """Have `event` written; returns at once, False where it comes too late. Any thread."""
+        with self._taking:
+            if self._ended or self._ending or self._refused or self._error is not None:
+                return False
             self._queue.put(event)
+            return True
 
     def add_exposure(self, exposure: RecordedExposure) -> None:
         """Have `exposure` written; returns at once. Any thread."""
@@ -183,6 +189,8 @@ class UDaqFileWriter(WorkerThread):
     @override
     def request_end(self) -> None:
         super().request_end()
+        with self._taking:
+            self._ending = True
         self._queue.put(_End())
         self._wake.set()
 

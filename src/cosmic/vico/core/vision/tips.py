@@ -40,7 +40,7 @@ BROAD_STD_PX: Final = 0.4
 """Of an inner corner that is reckoned from the outer one: how broad a jaw looks is not exact."""
 ROUGHER: Final = 2.0
 ONE_SIDED: Final = 4.0
-"""A side of a probe that is so much rougher than the other; noise makes less than 2."""
+"""A side of a probe that is so much rougher than the other; noise and specks make less than 3."""
 ROUGH_STD_PX: Final = 0.1
 LARGEST_STEP_PX: Final = 1.5
 
