@@ -1,6 +1,5 @@
 """Drift: the tips are looked for again now and then, and what moved is put right."""
 
-import logging
 import math
 from collections.abc import Generator
 from dataclasses import replace
@@ -21,8 +20,6 @@ from cosmic.autonomy.handling.prepare import (
 from cosmic.autonomy.handling.tips import TIMES_STD, Off, TipOff, shift_maps, tip_off
 from cosmic.autonomy.procedures.operation import SAFE_POINT, Steps, Yielded
 from cosmic.frame.errors import NotAvailable
-
-logger = logging.getLogger(__name__)
 
 DRIFT: Final = "drift of the tips"
 
@@ -103,9 +100,7 @@ def follow(
         x, y = known.probe_off_um
         known.probe_off_um = x + moved[0], y + moved[1]
         known.seen_off_um = off
-    if not probe.certain:
-        _warn_of_doubt(work, probe)
-    _note(work, gripper, moved, limit_um, probe_holds=probe.certain)
+    _note(work, gripper, moved, limit_um)
 
 
 def mark_unreliable(work: HandlingContext) -> None:
@@ -115,21 +110,9 @@ def mark_unreliable(work: HandlingContext) -> None:
         work.calibration.registry.forget(key, work.gripper.name)
 
 
-def _warn_of_doubt(work: HandlingContext, probe: TipOff) -> None:
-    logger.warning(
-        "%s is not seen for certain (%s), so whether it has drifted is not known; take away what "
-        "lies at it, or calibrate %r anew",
-        work.probe.shown,
-        probe.doubts,
-        PROBE,
-    )
-
-
-def _note(
-    work: HandlingContext, gripper: TipOff, moved: Off, limit_um: float, *, probe_holds: bool
-) -> None:
+def _note(work: HandlingContext, gripper: TipOff, moved: Off, limit_um: float) -> None:
     registry, now_s = work.calibration.registry, work.clock.now_s()
-    for key in (PLATE, HELD, PROBE) if probe_holds else (PLATE, HELD):
+    for key in (PLATE, HELD, PROBE):
         entry = registry.get(key, work.gripper.name)
         if entry is not None:
             values = dict(entry.values)

@@ -419,11 +419,6 @@ class ComparePositions(Calibrated):
         hold_y, settings = work.settings.places.hold_y_um, work.settings.calibration
         residual = yield from calibrate_at(work, settings.compare_x_um, hold_y, work.hold_tip_um)
         gripper, probe = yield from see_both(work)
-        if not probe.certain:
-            raise NotAvailable(
-                f"{work.probe.shown} is not seen for certain ({probe.doubts}); take away what lies "
-                "at it, then calibrate again"
-            )
         off = probe.off_um[0] - gripper.off_um[0], probe.off_um[1] - gripper.off_um[1]
         work.calibration.probe_off_um = work.calibration.seen_off_um = off
         self.kept(
@@ -445,8 +440,7 @@ class ComparePositions(Calibrated):
         finally:
             work.shared.zoomed = None
         yield from zoom_to(work, work.settings.zoom)
-        far = not math.hypot(*gripper.off_um) <= settings.residual_px * gripper.scale_um_px
-        if far or not probe.certain:
+        if not math.hypot(*gripper.off_um) <= settings.residual_px * gripper.scale_um_px:
             return None
         off = probe.off_um[0] - gripper.off_um[0], probe.off_um[1] - gripper.off_um[1]
         return replace(entry, values=_both(off))

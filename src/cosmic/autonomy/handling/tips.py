@@ -36,8 +36,6 @@ class TipOff:
         Nothing on the image makes one doubt it, such as a fibre at an edge.
     zoom_counts : float or None
         Where the zoom stood; None: not known, or there is none.
-    doubts : str
-        What makes one doubt it.
     """
 
     off_um: Off
@@ -45,7 +43,6 @@ class TipOff:
     scale_um_px: float = 0.0
     certain: bool = True
     zoom_counts: float | None = None
-    doubts: str = ""
 
 
 def tip_off(work: HandlingContext, image: CameraImage, tool: ToolSettings) -> TipOff:
@@ -62,8 +59,7 @@ def tip_off(work: HandlingContext, image: CameraImage, tool: ToolSettings) -> Ti
     std_um = math.hypot(found.std_px * mapped.scale_um_px, float(mapped.std_um(seen_px)))
     off_um = x - believed[0], y - believed[1]
     zoom = image.circumstances.zoom_counts
-    doubts = "; ".join(found.doubts)
-    return TipOff(off_um, std_um, mapped.scale_um_px, found.certain, zoom, doubts)
+    return TipOff(off_um, std_um, mapped.scale_um_px, found.certain, zoom)
 
 
 def shift_maps(work: HandlingContext, seen: TipOff, *, lens: bool = False) -> None:

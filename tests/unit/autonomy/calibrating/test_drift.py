@@ -1,6 +1,5 @@
 """What moved is followed; noise is not, and what moved far is measured anew."""
 
-from collections.abc import Generator
 from typing import Any
 
 import pytest
@@ -9,18 +8,15 @@ from cosmic.autonomy.calibrating.drift import DRIFT, CheckDrift, follow
 from cosmic.autonomy.calibrating.registry import CalibrationEntry
 from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.coordinate_transform import PlatformTransform
-from cosmic.autonomy.handling import prepare
 from cosmic.autonomy.handling.context import HEIGHTS, Calibration, HandlingContext, Measured
 from cosmic.autonomy.handling.plate import PlateFrame
-from cosmic.autonomy.handling.prepare import HELD, PLATE, PROBE, ComparePositions
+from cosmic.autonomy.handling.prepare import HELD, PLATE, PROBE
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.tips import TipOff, shift_maps
-from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.frame.clock import ManualClock
 from unit.autonomy.test_calibrations import plane
 
 PIXEL = (900.0, 500.0)
-DOUBTED = TipOff((4.0, -18.0), 0.2, certain=False, doubts="something lies against it")
 
 
 class Work:
@@ -31,12 +27,9 @@ class Work:
         self.clock = ManualClock()
         self.calibration = Calibration(frame=PlateFrame((10.0, -5.0)))
         self.calibration.probe_off_um = self.calibration.seen_off_um = 1.0, 2.0
-        self.gripper: Any = type("Tool", (), {"name": "left", "tip_um": (0.0, 0.0, 0.0)})
-        self.probe: Any = type("Tool", (), {"name": "probe", "shown": "the probe"})
+        self.gripper: Any = type("Tool", (), {"name": "left"})
         self.shared = self
         self.finished: list[object] = []
-        self.zoomed: float | None = None
-        self.hold_tip_um = 400.0
         self.vision = self
         self.first_camera = "top"
         self.transform = PlatformTransform.__new__(PlatformTransform)
@@ -82,52 +75,12 @@ def test_the_probe_is_followed_from_where_a_touch_has_it() -> None:
     assert entry.values["off_y_um"] == pytest.approx(6.5)
 
 
-def test_a_probe_with_a_fibre_at_its_edge_is_not_followed(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_a_probe_with_a_fibre_at_its_edge_is_not_followed() -> None:
     work: Any = Work()
     x, y = work.place_um()
-    follow(work, TipOff((3.0, -1.0), 0.2), DOUBTED)
+    follow(work, TipOff((3.0, -1.0), 0.2), TipOff((4.0, -18.0), 0.2, certain=False))
     assert work.calibration.probe_off_um == (1.0, 2.0)
     assert work.place_um() == pytest.approx([x - 3.0, y + 1.0])
-    assert "the probe is not seen for certain (something lies against it)" in caplog.text
-    assert "take away what lies at it, or calibrate 'probe against gripper' anew" in caplog.text
-
-
-def test_only_a_probe_that_is_seen_for_certain_is_noted_as_looked_at() -> None:
-    for probe, noted in ((DOUBTED, {PLATE, HELD}), (TipOff((1.0, 2.0), 0.2), {PLATE, HELD, PROBE})):
-        work: Any = Work()
-        registry = work.calibration.registry
-        before = {name: registry.get(name, "left") for name in (PLATE, HELD, PROBE)}
-        follow(work, TipOff((0.0, 0.0), 0.2), probe)
-        assert {name for name in before if registry.get(name, "left") != before[name]} == noted
-
-
-def test_a_probe_that_is_not_seen_for_certain_is_not_calibrated_by(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def seen(_work: object) -> Generator[object, object, tuple[TipOff, TipOff]]:
-        yield from ()
-        return TipOff((0.0, 0.0), 0.2, 1.0), DOUBTED
-
-    def nothing(*_: object) -> Generator[object, object, float]:
-        yield from ()
-        return 0.1
-
-    monkeypatch.setattr(prepare, "see_both", seen)
-    for name in ("calibrate_at", "zoom_to"):
-        monkeypatch.setattr(prepare, name, nothing)
-    work: Any = Work()
-    compare, entry = ComparePositions(), work.calibration.registry.get(PROBE, "left")
-    with pytest.raises(StopIteration) as looked:
-        next(compare.check(work, entry))
-    assert looked.value.value is None, "one of an earlier start does not hold by it"
-    work.calibration.made.clear()
-    work.calibration.registry.forget(PROBE, "left")
-    with pytest.raises(OperationFailed, match="not seen for certain"):
-        list(compare.steps(work))
-    assert PROBE not in work.calibration.made
-    assert work.calibration.probe_off_um == (1.0, 2.0)
 
 
 def test_what_may_be_noise_is_left_alone() -> None:
