@@ -220,17 +220,9 @@ def said_alone(read: Readings, settings: FitSettings) -> tuple[Floats, Floats]:
     spreads = VARIATION_PRIOR / VARIATION_PRIOR.sum()
     (weight,) = _prior_weights([evidence], [read], settings, spreads)
     posterior = posterior_of(evidence, weight)
-    return _says(read, Assessed(posterior, evidence, prior, settings.friction), weight, settings)
-
-
-def _says(
-    read: Readings, assessed: Assessed, weight: Floats, settings: FitSettings
-) -> tuple[Floats, Floats]:
-    """Return what one fibre says of what is common: precision, and precision times mean."""
-    own = _Said.of(read, assessed, weight, settings)
-    if read.certified is not None:
-        return own.with_unknown(read.certified[1])
-    return own.with_unknown(math.inf)
+    assessed = Assessed(posterior, evidence, prior, settings.friction)
+    std = math.inf if read.certified is None else read.certified[1]
+    return _Said.of(read, assessed, weight, settings).with_unknown(std)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,6 +13,7 @@ from cosmic.autonomy.bending.fit import (
     in_time,
     measure_fibre,
 )
+from cosmic.autonomy.bending.population import assess
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.standards import ForceScale
 from oracles.sealed_session import STANDARD_EI, Fibre, Session, World
@@ -82,6 +83,19 @@ def test_no_number_of_measurements_makes_a_beam_better_known_than_its_certificat
     often = scale_of(*[1.0] * 12, certificate=certificate)
     known = (0.02**-2 + SETTINGS.gain_std_part**-2) ** -0.5
     assert known < often.off_std_part < 1.15 * known
+
+
+def test_what_all_but_one_standard_say_is_what_they_say_without_it() -> None:
+    session = Session(WORLD, np.random.default_rng(5))
+    beam, read = Fibre.standard(session), []
+    for session.gain in (1.0, 1.0, 1.03):
+        one = measured(session, beam, Certificate(STANDARD_EI * SCALE, 0.04)).readings
+        assert one is not None
+        read.append(one)
+    without = assess(read[:2], SETTINGS).common
+    by_others = assess(read, SETTINGS).fibres[2].common
+    assert by_others.mean[0] == pytest.approx(without.mean[0], abs=2e-4)
+    assert by_others.covariance[0, 0] == pytest.approx(without.covariance[0, 0], rel=0.01)
 
 
 def test_a_poor_standard_does_not_outweigh_the_certificate_of_the_sensor() -> None:
