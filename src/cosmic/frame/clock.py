@@ -14,6 +14,7 @@ from typing import Final, Protocol
 
 from typing_extensions import override
 
+from cosmic.frame.expectations import Expectations
 from cosmic.frame.time_scale import Horizon, ScaledHorizon, ScaledWorker, TimeScale, Worker
 
 
@@ -54,6 +55,16 @@ class Clock(Protocol):
     def rate_reached(self) -> float:
         """Platform seconds per second of the wall that were reached of late."""
         return self.rate
+
+    @property
+    def expectations(self) -> Expectations | None:
+        """What is waited for in a hurry; None: nobody is hurried by this clock."""
+        return None
+
+    def expect(self, time_s: float) -> None:
+        """Want what there is at `time_s` then, however long the pieces are in which it comes."""
+        if self.expectations is not None:
+            self.expectations.add(time_s)
 
     def horizon(self) -> Horizon:
         """Return the horizon of somebody who must keep up with this time, if it waits for any."""
@@ -109,6 +120,7 @@ class RatedClock(Clock):
         # Nobody can be hurried by a clock that is no faster than the wall.
         self._accelerated = rate > 1.0
         self._time_scale = TimeScale(rate, wall_now_s) if waits or self._accelerated else None
+        self._expectations = Expectations() if self._accelerated else None
 
     @property
     @override
@@ -154,6 +166,11 @@ class RatedClock(Clock):
         if self._time_scale is None or not self._accelerated:
             return Worker()
         return ScaledWorker(self._time_scale, leads=leads)
+
+    @property
+    @override
+    def expectations(self) -> Expectations | None:
+        return self._expectations
 
     @property
     @override

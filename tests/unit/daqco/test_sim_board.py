@@ -157,6 +157,21 @@ def test_an_open_input_carries_some_millivolts_of_noise_and_hum() -> None:
 # --- the same again ---------------------------------------------------------------------------
 
 
+def test_the_same_seed_gives_the_same_samples_whatever_is_waited_for() -> None:
+    def read(waits_s: Sequence[float]) -> Array:
+        clock = RatedClock(50.0)
+        board = SimulatedLibrary(clock, {("Dev1", "ai0"): Level(1.0)}, seed=5).open("Dev1")
+        board.configure(inputs(1), 1000.0, 300)
+        board.start()
+        for each in waits_s:
+            clock.expect(each)
+        volts = np.concatenate([each.volts for each in chunks(board, 6)], axis=1)
+        board.close()
+        return volts[:, :600]
+
+    assert np.array_equal(read([]), read([0.1, 0.35, 0.36]))
+
+
 def test_the_same_seed_gives_the_same_samples_whatever_the_chunks() -> None:
     def run(seed: int, chunk: int, count: int) -> Array:
         library = SimulatedLibrary(stepping(), seed=seed)
@@ -231,6 +246,60 @@ def test_a_fast_clock_brings_the_samples_as_much_faster() -> None:
     got = chunks(board, 10)
     assert got[-1].first_sample == 9000
     assert clock.now_s() >= 10.0
+
+
+def test_on_a_fast_clock_whoever_waits_for_samples_gets_a_shorter_piece() -> None:
+    clock = RatedClock(20.0)
+    board = SimulatedLibrary(clock).open("Dev1")
+    board.configure(inputs(1), 1000.0, 2000)
+    board.start()
+    wanted_s = clock.now_s() + 0.2
+    clock.expect(wanted_s)
+    first = chunks(board, 1)[0]
+    end_s = first.time_s + first.volts.shape[1] / 1000.0
+    assert wanted_s < end_s <= wanted_s + 0.0021
+    assert clock.now_s() < wanted_s + 1.0, "and not at the end of a whole piece"
+    after = chunks(board, 1)[0]
+    assert after.first_sample == first.volts.shape[1], "nothing is lost or twice"
+    assert after.volts.shape == (1, 2000)
+
+
+def test_whoever_begins_to_wait_in_the_midst_of_a_piece_shortens_it() -> None:
+    clock = RatedClock(20.0)
+    board = SimulatedLibrary(clock).open("Dev1")
+    board.configure(inputs(1), 1000.0, 20_000)
+    board.start()
+    soon = threading.Timer(0.05, lambda: clock.expect(clock.now_s() + 0.1))
+    soon.start()
+    began_s = clock.wall_s()
+    piece = board.receive(2.0)
+    soon.join()
+    assert piece is not None
+    assert clock.wall_s() - began_s < 0.5, "20 s of the platform are one of the wall"
+    board.close()
+
+
+def test_the_pieces_of_boards_that_are_waited_for_end_at_the_same_samples() -> None:
+    clock = RatedClock(20.0)
+    library = SimulatedLibrary(clock)
+    boards = [library.open(name) for name in ("Dev1", "Dev2")]
+    for board in boards:
+        board.configure(inputs(1), 1000.0, 100)
+    for board in boards:
+        board.start()
+        clock.sleep(0.004)  # each begins a little later
+    for _ in range(30):
+        clock.expect(clock.now_s() + 0.031)
+        one, two = (chunks(board, 1)[0] for board in boards)
+        assert one.first_sample == two.first_sample
+        assert one.volts.shape == two.volts.shape
+    for board in boards:
+        board.close()
+
+
+def test_a_clock_that_hurries_nobody_leaves_all_pieces_whole() -> None:
+    assert RatedClock(1.0).expectations is None
+    assert ManualClock().expectations is None
 
 
 # --- trouble ----------------------------------------------------------------------------------

@@ -1,17 +1,20 @@
 """A movement of the probe that ends where it feels more than it should."""
 
 from collections.abc import Callable
+from typing import Final
 
 from cosmic.autonomy.handling.force import ForceWatch
 from cosmic.autonomy.handling.retrying_move import RetryingMove
 from cosmic.frame.errors import MoveCancelled
 
+LOOK_S: Final = 0.01
+
 
 class CarefulMove:
     """A movement that is cancelled as soon as the force comes beyond a bound; to be yielded.
 
-    It is looked at with each chunk of samples. Nothing is latched: what a limit does when it is
-    crossed, it does besides.
+    It is looked at with each chunk of samples, and each `LOOK_S` where a hurried simulation has
+    longer ones. Nothing is latched: what a limit does when it is crossed, it does besides.
 
     Parameters
     ----------
@@ -32,9 +35,16 @@ class CarefulMove:
         self._forces = forces
         self._low_un, self._high_un = low_un, high_un
         self._leave = forces.subscribe(self._look)
+        self._expect()
+
+    def _expect(self) -> None:
+        clock = self._forces.clock
+        clock.expect(clock.now_s() + LOOK_S)
 
     def _look(self) -> None:
         """Look at the newest samples; in the thread of the acquisition."""
+        if not self._movement.done:
+            self._expect()
         felt = self._forces.farthest_un(self._low_un, self._high_un)
         if felt is not None and self.felt_un is None and not self._movement.done:
             self.felt_un = felt

@@ -159,6 +159,7 @@ class ForceWanted:
         self._since_s = since_s
         self._until_s = since_s + seconds
         clock = watch.clock
+        clock.expect(self._until_s)
         ahead_s = max(0.0, self._until_s - clock.now_s()) / (clock.rate or 1.0)
         self._late_wall_s = WALL.now_s() + ahead_s + LIMIT_WALL_S
         self._mean: ForceMean | None = None

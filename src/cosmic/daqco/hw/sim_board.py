@@ -24,6 +24,7 @@ from cosmic.daqco.hw.sim_outputs import Terminals
 from cosmic.daqco.hw.sim_signal import Signal
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
+from cosmic.frame.events import Unsubscribe
 from cosmic.frame.time_scale import Horizon, Worker
 from cosmic.twin.trigger_line import TriggerLine
 
@@ -36,7 +37,21 @@ BUFFER_S: Final = 10.0
 LATE_S: Final = 0.04
 """So late may the receiver be, by the wall, before the platform's time waits for it."""
 
+EDGE_SAMPLES: Final = 1e-3
+"""What is asked for up to a sample is asked for with that sample, whatever the rounding."""
+
 MakeSignal = Callable[[Sequence[InputSettings], int], Signal]
+
+
+@dataclass(slots=True)
+class Pieces:
+    """The first sample of the piece that a board of a library gave last, and the one after it.
+
+    Boards that acquire together end a piece at the same sample.
+    """
+
+    first: int = -1
+    end: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +69,19 @@ class _Setup:
 
 @dataclass(slots=True)
 class _Run:
-    """One acquisition under way; only the receiving thread moves `next_sample`."""
+    """One acquisition under way; only the receiving thread moves its samples.
+
+    Attributes
+    ----------
+    next_sample, due_sample : int
+        The first one of the next chunk, and the first one after it.
+    """
 
     setup: _Setup
     start_s: float
     horizon: Horizon
     next_sample: int = 0
+    due_sample: int = 0
 
     def time_s(self, sample: int) -> float:
         """Return when a sample is truly taken."""
@@ -68,6 +90,10 @@ class _Run:
     def reported_s(self, sample: int) -> float:
         """Return when it is, as far as the board's clock knows."""
         return self.start_s + sample / self.setup.rate_hz
+
+    def first_at(self, reported_s: float) -> int:
+        """Return the first sample that is reported for this time or a later one."""
+        return math.ceil((reported_s - self.start_s) * self.setup.rate_hz + EDGE_SAMPLES)
 
 
 class SimulatedBoard(Board):
@@ -94,6 +120,8 @@ class SimulatedBoard(Board):
     receiver : Worker
         Of the library: the thread that receives, one for all boards. While it waits for a chunk of
         one board it is not at work on the chunk of another.
+    pieces : Pieces or None
+        Of the library: where its boards end their pieces, which somebody may wait for.
     """
 
     def __init__(
@@ -105,6 +133,7 @@ class SimulatedBoard(Board):
         *,
         owners: dict[str, "SimulatedBoard"],
         receiver: Worker,
+        pieces: Pieces | None = None,
         timebase_hz: float = TIMEBASE_HZ,
         paced: bool = True,
         clock_ppm: float = 0.0,
@@ -128,6 +157,8 @@ class SimulatedBoard(Board):
         self._run: _Run | None = None
         self._closed = False
         self._receiver = receiver
+        self._pieces = pieces or Pieces()
+        self._leave_expected: Unsubscribe = lambda: None
 
     @property
     @override
@@ -166,8 +197,9 @@ class SimulatedBoard(Board):
                 raise self._error("start: it is acquiring already", DeviceFault.STATE)
             start_s = math.inf if self._start_trigger else self._clock.now_s()
             run = _Run(self._setup, start_s, self._clock.horizon())
-            run.horizon.move_to(self._horizon_s(run))
+            run.horizon.move_to(self._horizon_s(self._due_s(run)))
             self._run = run
+            self._hear_expected()
         if self._start_trigger:
             self._terminals.once(self._start_trigger, lambda at_s: self._triggered(run, at_s))
         else:
@@ -179,10 +211,11 @@ class SimulatedBoard(Board):
         if run is None:
             return None
         setup, first = run.setup, run.next_sample
-        times_s = setup.offsets_s + run.time_s(first)
+        times_s = setup.offsets_s[: run.due_sample - first] + run.time_s(first)
         # Outside the lock: a source may be slow, and a stop must not wait for it.
         volts = setup.signal.volts(first, times_s)
-        run.next_sample = first + setup.chunk_samples
+        self._pieces.first, self._pieces.end = first, run.due_sample
+        run.next_sample = run.due_sample
         if self._run is not run:
             return None
         return BoardChunk(first, run.reported_s(first), volts)
@@ -227,9 +260,9 @@ class SimulatedBoard(Board):
             run = self._run
             while run is not None and self._run is run:
                 self._check_going(run)
-                run.horizon.move_to(self._horizon_s(run))
-                now_s = self._clock.now_s()
                 due_s = self._due_s(run)
+                run.horizon.move_to(self._horizon_s(due_s))
+                now_s = self._clock.now_s()
                 if due_s <= now_s:
                     self._receiver.busy()  # until it has handed the chunk on, and comes again
                     return run
@@ -246,13 +279,38 @@ class SimulatedBoard(Board):
     def _due_s(self, run: _Run) -> float:
         if self._faults.hit("stalled", self._info.name):
             return math.inf
+        run.due_sample = self._due_sample(run)
         if not self._paced:
             return -math.inf
-        return run.time_s(run.next_sample + run.setup.chunk_samples)
+        return run.time_s(run.due_sample)
 
-    def _horizon_s(self, run: _Run) -> float:
-        """Return how far the platform's time may go before the next chunk is fetched."""
-        due_s = self._due_s(run)
+    def _due_sample(self, run: _Run) -> int:
+        """Return the first sample after the next chunk, which is whole unless it is waited for."""
+        whole = run.next_sample + run.setup.chunk_samples
+        if self._pieces.first == run.next_sample:
+            return min(self._pieces.end, whole)
+        expectations = self._clock.expectations
+        if expectations is None or math.isinf(run.start_s):
+            return whole
+        wanted_s = expectations.next_s(run.reported_s(run.next_sample))
+        if wanted_s == math.inf:
+            return whole
+        return min(max(run.first_at(wanted_s), run.next_sample + 1), whole)
+
+    def _hear_expected(self) -> None:
+        """Bring the end of a chunk forward when somebody waits for a part of it."""
+        expectations = self._clock.expectations
+        if expectations is not None:
+            self._leave_expected = expectations.added.subscribe(self._expected)
+
+    def _expected(self, time_s: float) -> None:
+        run = self._run
+        if run is not None and time_s < run.time_s(run.due_sample):
+            with self._faults.changed:
+                self._faults.changed.notify_all()
+
+    def _horizon_s(self, due_s: float) -> float:
+        """Return how far the platform's time may go before what is due then is fetched."""
         return due_s + LATE_S * max(1.0, self._clock.rate) if due_s > -math.inf else math.inf
 
     def _check_going(self, run: _Run) -> None:
@@ -270,6 +328,7 @@ class SimulatedBoard(Board):
             self._run.horizon.close()
             if self._line is not None:
                 self._line.rest(self._clock.now_s())
+            self._leave_expected()
         self._run = None
         self._receiver.idle()
 

@@ -17,7 +17,7 @@ from cosmic.daqco.hw.interface import (
     InputSettings,
     Source,
 )
-from cosmic.daqco.hw.sim_board import SimulatedBoard
+from cosmic.daqco.hw.sim_board import Pieces, SimulatedBoard
 from cosmic.daqco.hw.sim_faults import BoardFaults
 from cosmic.daqco.hw.sim_outputs import OutputLevel, SimulatedOutputs, Terminals
 from cosmic.daqco.hw.sim_signal import BoardSignal, Signal
@@ -138,6 +138,7 @@ class SimulatedLibrary(BoardLibrary):
         self.faults = BoardFaults()
         self._owners: dict[str, SimulatedBoard] = {}
         self._receiver = clock.worker()
+        self._pieces = Pieces()
         self.terminals = Terminals()
         self._levels = {
             name: {f"ao{number}": OutputLevel() for number in range(ANALOG_OUTPUTS)}
@@ -198,6 +199,7 @@ class SimulatedLibrary(BoardLibrary):
             make_signal,
             owners=self._owners,
             receiver=self._receiver,
+            pieces=self._pieces,
             clock_ppm=self._clock_ppm,
             terminals=self.terminals,
             start_trigger=self._start_triggers.get(name, ""),
