@@ -8,7 +8,8 @@ it, 1/k = 1/(EI cos^2 b) times the integral of (X cos b + Y sin b)^2 over the le
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Final
 
@@ -17,8 +18,8 @@ import numpy.typing as npt
 
 from cosmic.autonomy.bending.result import BendingError, Floats
 
-POWERS: Final = np.arange(1, 8)
-"""Of the length, in the polynomial; the turning is nothing at the clamp."""
+TERMS: Final = 7
+"""Of the polynomial; the turning is nothing at the clamp."""
 
 POINTS: Final = 20
 LOADS: Final = 40
@@ -29,6 +30,10 @@ ROUNDS: Final = 40
 MET_PART: Final = 1e-6
 """Of the lever: how near the contact must come to the probe."""
 
+STILL_PART: Final = 1e-12
+"""Of the lever, and of 1 rad: what moves less is in balance; more rounds would only round it."""
+
+LONGEST_STEP_UM: Final = 20.0
 LEAST_COS: Final = 0.2
 TURNS: Final = 3
 DIRECTION_UM: Final = 40.0
@@ -39,12 +44,19 @@ Mask = npt.NDArray[np.bool_]
 
 
 @cache
-def _quadrature() -> tuple[Floats, Floats, Floats, Floats]:
-    """Return points of the unit length, their weights, the powers there, and bending inverted."""
+def _quadrature() -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Return points of the unit length, weights, turning by term, until the end, and weighed.
+
+    Terms are integrals of Legendre polynomials: bent by one, the fibre does no work on another,
+    and 1 on itself. All but the first are nothing at the end of the length.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(POINTS)
-    part = 0.5 * (nodes + 1.0)
-    bending = POWERS[:, None] * POWERS / (POWERS[:, None] + POWERS - 1.0)
-    return part, 0.5 * weights, part[:, None] ** POWERS, np.linalg.inv(bending)
+    bending = np.diag(np.sqrt(2.0 * np.arange(TERMS) + 1.0))
+    turning = np.polynomial.legendre.legint(bending, lbnd=-1.0, scl=0.5)
+    terms = np.polynomial.legendre.legval(nodes, turning).T
+    before_end = (np.arange(TERMS) == 0) - terms
+    part, weight = 0.5 * (nodes + 1.0), 0.5 * weights
+    return part[:, None], weight, terms, before_end, np.ascontiguousarray(terms.T * weight)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,6 +89,29 @@ class PushedCurve:
         force = k_un_um * lever_um * self.pushed
         travel = lever_um * self.deflection + force / sensor_un_um
         return np.asarray(np.interp(probe_um, travel, force), dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pushes:
+    """Loads that a fibre is bent by, one by one.
+
+    Attributes
+    ----------
+    loads, rub, sides : ndarray, shape (n,), float64
+        Force over EI (1/um2), its angle by friction (rad), and how far the probe gives way along
+        the jaws for a load of 1 (um3).
+    """
+
+    loads: Floats
+    rub: Floats
+    sides: Floats
+    depth_um: float
+    radius_um: float
+
+    def of(self, chosen: Mask) -> "_Pushes":
+        return replace(
+            self, loads=self.loads[chosen], rub=self.rub[chosen], sides=self.sides[chosen]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +150,7 @@ class NaturalShape:
         steps = np.hypot(np.diff(self.ahead_um), np.diff(self.aside_um))
         return np.concatenate([[0.0], np.cumsum(steps)])
 
-    @property
+    @cached_property
     def slope_rad(self) -> float:
         """Natural direction at the probe, positive where the fibre runs towards it."""
         return float(self._headings(np.array([self._arc_at(self.at_um)]))[0])
@@ -132,14 +167,23 @@ class NaturalShape:
 
     def levers_um(self, depths_um: Floats) -> Floats:
         """Return the lever for each of several depths of the clamp."""
-        along, arms = self.arms_um()
-        first, second = arms[:-1], arms[1:]
-        free = float(((first * first + first * second + second * second) * np.diff(along)).sum())
+        arm = self._arms[1][0]
         # Between the jaws the fibre is straight: its part of the integral is a cube.
-        return np.asarray(np.cbrt(free + (arms[0] + depths_um) ** 3 - arms[0] ** 3))
+        return np.asarray(np.cbrt(self._free_um3 + (arm + depths_um) ** 3 - arm**3))
 
     def arms_um(self) -> tuple[Floats, Floats]:
         """Return lengths from the jaws' tip to the contact, and the arm of a push about each."""
+        return self._arms
+
+    @cached_property
+    def _free_um3(self) -> float:
+        """Integral over the square of the arm from the jaws' tip on, three times."""
+        along, arms = self._arms
+        first, second = arms[:-1], arms[1:]
+        return float(((first * first + first * second + second * second) * np.diff(along)).sum())
+
+    @cached_property
+    def _arms(self) -> tuple[Floats, Floats]:
         end = self._arc_at(self.at_um)
         along = np.unique(np.concatenate([[0.0], self._arcs[self._arcs < end], [end]]))
         x, y = self._places(along)
@@ -184,29 +228,85 @@ class NaturalShape:
         BendingError
             The fibre slides off.
         """
+        (both,) = self.curves_by_side(
+            depth_um=depth_um,
+            radius_um=radius_um,
+            friction=friction,
+            ei_un_um2=ei_un_um2,
+            sides_um_un=(side_um_un,),
+        )
+        return both
+
+    def curves_by_side(
+        self,
+        *,
+        depth_um: float,
+        radius_um: float,
+        friction: float,
+        ei_un_um2: float,
+        sides_um_un: Sequence[float],
+    ) -> tuple[tuple[PushedCurve, PushedCurve], ...]:
+        """Return what `curves` does, for each of several ways in which the probe gives way.
+
+        Raises
+        ------
+        BendingError
+            The fibre slides off.
+        """
         lever = self.lever_um(depth_um)
         one = np.linspace(0.0, 1.0, LOADS) ** 1.5 * (HEAVIEST / lever**2)
-        loads, rub = np.tile(one, 2), np.repeat([math.atan(friction), -math.atan(friction)], LOADS)
-        ends = np.full(2 * LOADS, self._arc_at(self.at_um))
-        aside = ei_un_um2 * side_um_un
-        factors = np.zeros((2 * LOADS, len(POWERS)))
-        off, contact = np.zeros(2 * LOADS), np.zeros(2 * LOADS)
-        y, across = off, off
+        rub = np.repeat([math.atan(friction), -math.atan(friction)], LOADS)
+        sides = ei_un_um2 * np.asarray(sides_um_un)
+        pushes = _Pushes(
+            np.tile(one, 2 * len(sides)),
+            np.tile(rub, len(sides)),
+            np.repeat(sides, 2 * LOADS),
+            depth_um,
+            radius_um,
+        )
+        found = self._balanced(pushes, lever)
+        return tuple(self._both_ways(each, radius_um, lever) for each in found)
+
+    def _balanced(self, pushes: "_Pushes", lever: float) -> list[Floats]:
+        """Return equilibria of each probe, out and back.
+
+        Rows are the length up to the contact, the direction there, how far ahead of the contact
+        the probe is, its place across, and the force across over EI; columns the loads.
+        """
+        count = len(pushes.loads)
+        found, rows = np.zeros((5, count)), np.zeros((5, count))
+        rows[0] = self._arc_at(self.at_um)
+        factors, moving = np.zeros((TERMS, count)), np.arange(count)
         for _ in range(ROUNDS):
-            ends = ends + np.clip(off / np.maximum(np.cos(contact), LEAST_COS), -20.0, 20.0)
-            x, y, across, contact, factors = self._bent(
-                ends, loads, rub, factors, depth_um, radius_um
-            )
-            off = self.at_um - aside * loads * np.sin(contact + rub) - x
-            if np.abs(off).max() < MET_PART * lever:
+            ends, contact, off, _, _ = rows
+            steps = off / np.maximum(np.cos(contact), LEAST_COS)
+            ends = ends + np.minimum(np.maximum(steps, -LONGEST_STEP_UM), LONGEST_STEP_UM)
+            rows, turned = self._bent(ends, factors, pushes)
+            found[:, moving] = rows
+            away, turns = np.abs(rows[2]), np.abs(turned - factors).max(axis=0)
+            # Each probe is tried until all its loads are met, or none of the rest moves any more.
+            probes = moving // (2 * LOADS)
+            unmet = np.bincount(probes[away >= MET_PART * lever], minlength=count) > 0
+            on = unmet[probes] & ((away >= STILL_PART * lever) | (turns >= STILL_PART))
+            factors = turned
+            if not on.all():
+                rows, factors, moving = rows[:, on], factors[:, on], moving[on]
+                pushes = pushes.of(on)
+            if not len(moving):
                 break
+        return np.split(found, count // (2 * LOADS), axis=1)
+
+    def _both_ways(
+        self, found: Floats, radius_um: float, lever: float
+    ) -> tuple[PushedCurve, PushedCurve]:
+        ends, contact, off, y, across = found
         wandered = (ends - radius_um * contact).reshape(2, LOADS).mean(axis=0)
         inwards = wandered < wandered[0]
-        good = (np.abs(off) < 1e-3 * lever).reshape(2, LOADS)
+        good = np.abs(off) < 1e-3 * lever
         both = []
         for first in (0, 1):
             chosen = np.where(inwards, 1 - first, first) * LOADS + np.arange(LOADS)
-            both.append(self._pushed(y[chosen], across[chosen], good.ravel()[chosen], lever=lever))
+            both.append(self._pushed(y[chosen], across[chosen], good[chosen], lever=lever))
         return both[0], both[1]
 
     def _pushed(self, y: Floats, across: Floats, good: Mask, *, lever: float) -> PushedCurve:
@@ -221,40 +321,26 @@ class NaturalShape:
             )
         return PushedCurve(deflection[:last] / lever, across[:last] * lever**2 / 3.0)
 
-    def _bent(
-        self,
-        ends: Floats,
-        loads: Floats,
-        rub: Floats,
-        factors: Floats,
-        depth_um: float,
-        radius_um: float,
-    ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-        """Take one step towards equilibrium.
+    def _bent(self, ends: Floats, factors: Floats, pushes: "_Pushes") -> tuple[Floats, Floats]:
+        """Take one step towards equilibrium, with the contact at `ends`.
 
-        Returns the middle of the probe, x and y, the force across over EI, the direction at the
-        contact, and the polynomial, by load.
+        Returns the rows of `_balanced`, and the polynomials, by load.
         """
-        part, weight, shapes, given = _quadrature()
-        lengths = (ends + depth_um)[:, None]
-        natural = self._headings(lengths * part - depth_um)
-        at_end = self._headings(ends)
+        part, weight, terms, before_end, weighed = _quadrature()
+        lengths = ends + pushes.depth_um
+        natural, at_end = self._headings(part * lengths - pushes.depth_um), self._headings(ends)
+        to_push, gives = at_end + pushes.rub - natural, -pushes.loads * (lengths * lengths)
         for _ in range(TURNS):
-            heading = natural + factors @ shapes.T
-            pushes = (at_end + factors.sum(axis=1) + rub)[:, None]
-            work = (np.cos(pushes - heading) * weight) @ shapes
-            factors = -(loads[:, None] * lengths**2) * (work @ given)
-        heading = natural + factors @ shapes.T
-        contact = at_end + factors.sum(axis=1)
-        x = (np.cos(heading) * weight).sum(axis=1) * lengths[:, 0] - depth_um
-        y = (np.sin(heading) * weight).sum(axis=1) * lengths[:, 0]
-        return (
-            x - radius_um * np.sin(contact),
-            y + radius_um * np.cos(contact),
-            loads * np.cos(contact + rub),
-            contact,
-            factors,
-        )
+            factors = gives * (weighed @ np.cos(to_push + before_end @ factors))
+        heading, contact = natural + terms @ factors, at_end + factors[0]
+        pushed = contact + pushes.rub
+        x = (weight @ np.cos(heading)) * lengths - pushes.depth_um
+        y = (weight @ np.sin(heading)) * lengths
+        along = x - pushes.radius_um * np.sin(contact)
+        gone = pushes.sides * pushes.loads * np.sin(pushed)
+        off = self.at_um - gone - along
+        across = y + pushes.radius_um * np.cos(contact)
+        return np.stack([ends, contact, off, across, pushes.loads * np.cos(pushed)]), factors
 
     def _arc_at(self, ahead_um: float) -> float:
         return float(np.interp(ahead_um, self.ahead_um, self._arcs))
@@ -269,6 +355,13 @@ class NaturalShape:
         y = np.interp(along, arcs, self.aside_um) + over * last[1] / step
         return x, y
 
-    def _headings(self, along: Floats) -> Floats:
+    @cached_property
+    def _chords(self) -> tuple[Floats, npt.NDArray[np.complex128]]:
+        """Places where the chord that gives a direction bends, and the chords: ahead, i aside."""
+        along = np.unique(np.concatenate([self._arcs - DIRECTION_UM, self._arcs + DIRECTION_UM]))
         before, after = self._places(along - DIRECTION_UM), self._places(along + DIRECTION_UM)
-        return np.asarray(np.arctan2(after[1] - before[1], after[0] - before[0]))
+        return along, (after[0] - before[0]) + 1j * (after[1] - before[1])
+
+    def _headings(self, along: Floats) -> Floats:
+        chords = np.interp(along, *self._chords)
+        return np.asarray(np.arctan2(chords.imag, chords.real))

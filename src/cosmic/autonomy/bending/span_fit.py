@@ -94,14 +94,13 @@ class _Model:
         self.stroke_part = (
             max(float(np.max(points.probe_um)) - first.hinge_um, 0.0) / self.length_um
         )
-        about = {
-            "depth_um": depth,
-            "radius_um": settings.radius_um,
-            "friction": friction,
-            "ei_un_um2": max(first.k_un_um, 0.0) * self.length_um**3 / 3.0,
-        }
-        self.curves = shape.curves(**about, side_um_un=1.0 / settings.side_un_um)
-        self.stiff_probe = shape.curves(**about)
+        self.curves, self.stiff_probe = shape.curves_by_side(
+            depth_um=depth,
+            radius_um=settings.radius_um,
+            friction=friction,
+            ei_un_um2=max(first.k_un_um, 0.0) * self.length_um**3 / 3.0,
+            sides_um_un=(1.0 / settings.side_un_um, 0.0),
+        )
         self._elapsed_s = points.time_s - points.time_s[0]
         self._lost = _lost(points.time_s)
         # A way back that never touches says where the baseline is, and nothing of the fibre.
