@@ -53,8 +53,8 @@ def _quadrature() -> tuple[Floats, Floats, Floats, Floats, Floats]:
     nodes, weights = np.polynomial.legendre.leggauss(POINTS)
     bending = np.diag(np.sqrt(2.0 * np.arange(TERMS) + 1.0))
     turning = np.polynomial.legendre.legint(bending, lbnd=-1.0, scl=0.5)
-    terms = np.polynomial.legendre.legval(nodes, turning).T
-    before_end = (np.arange(TERMS) == 0) - terms
+    terms: Floats = np.asarray(np.polynomial.legendre.legval(nodes, turning)).T
+    before_end = np.asarray((np.arange(TERMS) == 0) - terms)
     part, weight = 0.5 * (nodes + 1.0), 0.5 * weights
     return part[:, None], weight, terms, before_end, np.ascontiguousarray(terms.T * weight)
 

@@ -115,7 +115,7 @@ class _Model:
             log_k, hinge_um = values[2 * number], values[2 * number + 1]
             ahead = self._points.probe_um[branch] - hinge_um
             force[branch] = self._force(ahead, log_k, self.curves[number])
-        return np.asarray(force - values[-1] * (self._lost @ np.diff(force, prepend=0.0)))
+        return np.asarray(force - values[-1] * (self._lost @ force))
 
     def _force(self, ahead_um: Floats, log_k: float, curve: PushedCurve) -> Floats:
         return curve.force_un(
@@ -127,14 +127,21 @@ class _Model:
 
     def slopes(self, values: Floats) -> Floats:
         """Return the derivatives of the force to each value, shape (points, values)."""
-        found = np.zeros((len(self._points.probe_um), len(values)))
-        here = self.contact(values)
-        for number in (*range(2 * len(self.branches)), len(values) - 1):
-            more = values.copy()
-            more[number] += TINY
-            found[:, number] = (self.contact(more) - here) / TINY
-        found[:, -3], found[:, -2] = 1.0, self._elapsed_s
-        return found
+        count = 2 * len(self.branches)
+        force = np.zeros(len(self._points.probe_um))
+        by_value = np.zeros((len(values), len(force)))
+        for number, branch in enumerate(self.branches):
+            curve, (log_k, hinge_um) = self.curves[number], values[2 * number : 2 * number + 2]
+            probe = self._points.probe_um[branch]
+            ahead, nearer = probe - hinge_um, probe - (hinge_um + TINY)
+            here, there = self._force(np.stack([ahead, nearer]), log_k, curve)
+            stiffer = self._force(ahead, log_k + TINY, curve)
+            force[branch] = here
+            by_value[2 * number, branch] = (stiffer - here) / TINY
+            by_value[2 * number + 1, branch] = (there - here) / TINY
+        by_value[:count] -= values[-1] * (by_value[:count] @ self._lost.T)
+        by_value[-3], by_value[-2], by_value[-1] = 1.0, self._elapsed_s, -(self._lost @ force)
+        return by_value.T
 
     def total(self, values: Floats) -> Floats:
         return np.asarray(self.contact(values) + self.baseline(values), dtype=np.float64)
@@ -247,13 +254,15 @@ class _Model:
 
 
 def _lost(time_s: Floats) -> Floats:
-    """Return what of each step of force is lost at each time, for a part of 1 in a tenfold time.
+    """Return what is lost at each time of the force at each, for a part of 1 in a tenfold time.
 
-    Counted from `RELAXED_AT_S` after the step: stiffness is what a fibre shows then.
+    Each step of the force counts from `RELAXED_AT_S` after it: stiffness is what a fibre shows
+    then.
     """
     middles = time_s - 0.5 * np.diff(time_s, prepend=2.0 * time_s[0] - time_s[1])
     since = (time_s[:, None] - middles[None, :]) / RELAXED_AT_S
-    return np.where(since > 0.0, np.log10(np.maximum(since, 1e-3)), 0.0)
+    of_steps = np.where(since > 0.0, np.log10(np.maximum(since, 1e-3)), 0.0)
+    return np.asarray(-np.diff(of_steps, append=0.0))
 
 
 def fit_span(
