@@ -9,7 +9,7 @@ it, 1/k = 1/(EI cos^2 b) times the integral of (X cos b + Y sin b)^2 over the le
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Final
 
@@ -109,9 +109,8 @@ class _Pushes:
     radius_um: float
 
     def of(self, chosen: Mask) -> "_Pushes":
-        return replace(
-            self, loads=self.loads[chosen], rub=self.rub[chosen], sides=self.sides[chosen]
-        )
+        loads, rub, sides = self.loads[chosen], self.rub[chosen], self.sides[chosen]
+        return _Pushes(loads, rub, sides, self.depth_um, self.radius_um)
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,7 +339,7 @@ class NaturalShape:
         gone = pushes.sides * pushes.loads * np.sin(pushed)
         off = self.at_um - gone - along
         across = y + pushes.radius_um * np.cos(contact)
-        return np.stack([ends, contact, off, across, pushes.loads * np.cos(pushed)]), factors
+        return np.array([ends, contact, off, across, pushes.loads * np.cos(pushed)]), factors
 
     def _arc_at(self, ahead_um: float) -> float:
         return float(np.interp(ahead_um, self.ahead_um, self._arcs))

@@ -30,6 +30,12 @@ from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
 
 ROUNDS: Final = 2
+ENOUGH: Final = 1e-8
+"""Of values and sum of squares: a change that ends a round."""
+
+ALIKE_PART: Final = 1e-20
+"""Of a column's square: what is left of one that says nothing new."""
+
 LEAST_OF_A_BRANCH: Final = 3
 LEAST_CLEAR: Final = 2
 CLOSE_SIGMAS: Final = 2.5
@@ -214,7 +220,7 @@ class _Model:
     def fit(self) -> _Found:
         points, settings = self._points, self._settings
         baseline = free_force_un(points)
-        from scipy.optimize import least_squares  # half a second, at the first fit
+        from scipy.optimize import leastsq  # half a second, at the first fit
 
         start: list[float] = []
         for branch in self.branches:
@@ -241,11 +247,18 @@ class _Model:
             def slopes(tried: Floats, whiten: Floats = whiten) -> Floats:
                 return np.vstack([-whiten @ self.slopes(tried), -known, -tie])
 
-            found = least_squares(
-                misfit, values, jac=slopes, method="lm", x_scale="jac", max_nfev=200
+            values, _, found, _, _ = leastsq(
+                misfit,
+                values,
+                Dfun=slopes,
+                full_output=True,
+                ftol=ENOUGH,
+                xtol=ENOUGH,
+                gtol=ENOUGH,
+                maxfev=200,
             )
-            values, jacobian = found.x, found.jac
-            chi2 = float((found.fun[:-2] ** 2).sum())
+            jacobian = slopes(values)
+            chi2 = float((found["fvec"][:-2] ** 2).sum())
         weak = np.array([*BRANCH_STDS * len(self.branches), *BASELINE_STDS, 1.0]) ** -2.0
         information = jacobian.T @ jacobian + np.diag(weak)
         covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
@@ -464,22 +477,28 @@ def _kinds_of_yielding(
     travel, k = points.probe_um[out], math.exp(min(values[0], HIGHEST_LOG))
     freedom = max(len(out) - base.shape[1] - 2, 1)
 
-    def explained(*extra: Floats) -> tuple[float, float]:
-        matrix = np.column_stack([base, *extra]) * weight[:, None]
-        found = np.linalg.lstsq(matrix, left * weight, rcond=None)[0]
-        rest = left * weight - matrix @ found
-        return float(rest @ rest) / freedom, float(found[-1])
+    weighed, left = base * weight[:, None], left * weight
+    known, sizes, _ = np.linalg.svd(weighed, full_matrices=False)
+    known = known[:, sizes > sizes[0] * np.finfo(float).eps * len(out)]
+    left = left - known @ (known.T @ left)
+    plain = float(left @ left) / freedom
 
-    plain = explained()[0]
-    slip, slowly = (plain, 0.0), plain
-    for begin in range(1, len(out) - 1):
-        if travel[begin] <= values[1]:
-            continue
-        step = -k * (np.arange(len(out)) >= begin).astype(float)
-        chi2, size_um = explained(step)
-        if size_um > 0.0 and chi2 < slip[0]:
-            slip = chi2, size_um
-        chi2, part = explained(-k * np.maximum(travel - travel[begin], 0.0))
-        if part > 0.0:
-            slowly = min(slowly, chi2)
-    return slip, slowly, plain
+    def explained(more: Floats) -> tuple[float, float]:
+        """Return what the best of several columns leaves, and how much of it is needed."""
+        columns = more * weight[:, None]
+        whole = (columns * columns).sum(axis=0)
+        columns = columns - known @ (known.T @ columns)
+        own = (columns * columns).sum(axis=0)
+        new = own > ALIKE_PART * whole
+        size = np.divide(left @ columns, own, out=np.zeros(len(own)), where=new)
+        chi2 = np.where(size > 0.0, plain - size**2 * own / freedom, plain)
+        best = int(np.argmin(chi2))
+        return float(chi2[best]), float(max(size[best], 0.0))
+
+    begins = np.arange(1, len(out) - 1)
+    begins = begins[travel[begins] > values[1]]
+    if not len(begins):
+        return (plain, 0.0), plain, plain
+    at_once = -k * (np.arange(len(out))[:, None] >= begins).astype(float)
+    slowly = -k * np.maximum(travel[:, None] - travel[begins], 0.0)
+    return explained(at_once), explained(slowly)[0], plain
