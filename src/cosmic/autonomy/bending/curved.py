@@ -45,7 +45,9 @@ Mask = npt.NDArray[np.bool_]
 
 @cache
 def _quadrature() -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Return points of the unit length, weights, turning by term, until the end, and weighed.
+    """Return points of the unit length and its end, weights, and turning by term.
+
+    The turning at the points, from them to the end, and weighed.
 
     Terms are integrals of Legendre polynomials: bent by one, the fibre does no work on another,
     and 1 on itself. All but the first are nothing at the end of the length.
@@ -53,9 +55,9 @@ def _quadrature() -> tuple[Floats, Floats, Floats, Floats, Floats]:
     nodes, weights = np.polynomial.legendre.leggauss(POINTS)
     bending = np.diag(np.sqrt(2.0 * np.arange(TERMS) + 1.0))
     turning = np.polynomial.legendre.legint(bending, lbnd=-1.0, scl=0.5)
-    terms: Floats = np.asarray(np.polynomial.legendre.legval(nodes, turning)).T
+    terms = np.asarray(np.polynomial.legendre.legval(nodes, turning), dtype=np.float64).T
     before_end = np.asarray((np.arange(TERMS) == 0) - terms)
-    part, weight = 0.5 * (nodes + 1.0), 0.5 * weights
+    part, weight = 0.5 * (np.append(nodes, 1.0) + 1.0), 0.5 * weights
     return part[:, None], weight, terms, before_end, np.ascontiguousarray(terms.T * weight)
 
 
@@ -97,11 +99,14 @@ class _Pushes:
 
     Attributes
     ----------
+    chords
+        Of the fibre before.
     loads, rub, sides : ndarray, shape (n,), float64
         Force over EI (1/um2), its angle by friction (rad), and how far the probe gives way along
         the jaws for a load of 1 (um3).
     """
 
+    chords: "_Chords"
     loads: Floats
     rub: Floats
     sides: Floats
@@ -110,7 +115,7 @@ class _Pushes:
 
     def of(self, chosen: Mask) -> "_Pushes":
         loads, rub, sides = self.loads[chosen], self.rub[chosen], self.sides[chosen]
-        return _Pushes(loads, rub, sides, self.depth_um, self.radius_um)
+        return _Pushes(self.chords, loads, rub, sides, self.depth_um, self.radius_um)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +157,7 @@ class NaturalShape:
     @cached_property
     def slope_rad(self) -> float:
         """Natural direction at the probe, positive where the fibre runs towards it."""
-        return float(self._headings(np.array([self._arc_at(self.at_um)]))[0])
+        return float(np.angle(self._chord(np.array([self._arc_at(self.at_um)])))[0])
 
     def lever_um(self, depth_um: float = 0.0) -> float:
         """Return the length of a straight fibre that gives way as much to a small push.
@@ -257,6 +262,7 @@ class NaturalShape:
         rub = np.repeat([math.atan(friction), -math.atan(friction)], LOADS)
         sides = ei_un_um2 * np.asarray(sides_um_un)
         pushes = _Pushes(
+            self._chords(),
             np.tile(one, 2 * len(sides)),
             np.tile(rub, len(sides)),
             np.repeat(sides, 2 * LOADS),
@@ -327,7 +333,8 @@ class NaturalShape:
         """
         part, weight, terms, before_end, weighed = _quadrature()
         lengths = ends + pushes.depth_um
-        natural, at_end = self._headings(part * lengths - pushes.depth_um), self._headings(ends)
+        headings = _headings(part * lengths - pushes.depth_um, pushes.chords)
+        natural, at_end = headings[:-1], headings[-1]
         to_push, gives = at_end + pushes.rub - natural, -pushes.loads * (lengths * lengths)
         for _ in range(TURNS):
             factors = gives * (weighed @ np.cos(to_push + before_end @ factors))
@@ -354,13 +361,22 @@ class NaturalShape:
         y = np.interp(along, arcs, self.aside_um) + over * last[1] / step
         return x, y
 
-    @cached_property
-    def _chords(self) -> tuple[Floats, npt.NDArray[np.complex128]]:
-        """Places where the chord that gives a direction bends, and the chords: ahead, i aside."""
+    def _chords(self) -> "_Chords":
         along = np.unique(np.concatenate([self._arcs - DIRECTION_UM, self._arcs + DIRECTION_UM]))
-        before, after = self._places(along - DIRECTION_UM), self._places(along + DIRECTION_UM)
-        return along, (after[0] - before[0]) + 1j * (after[1] - before[1])
+        return along, self._chord(along)
 
-    def _headings(self, along: Floats) -> Floats:
-        chords = np.interp(along, *self._chords)
-        return np.asarray(np.arctan2(chords.imag, chords.real))
+    def _chord(self, along: Floats) -> npt.NDArray[np.complex128]:
+        before, after = self._places(along - DIRECTION_UM), self._places(along + DIRECTION_UM)
+        return np.asarray((after[0] - before[0]) + 1j * (after[1] - before[1]))
+
+
+_Chords = tuple[Floats, npt.NDArray[np.complex128]]
+"""Places along a fibre between which its chords change evenly, and the chords there.
+
+A chord goes over `DIRECTION_UM` to both sides, ahead and i times aside.
+"""
+
+
+def _headings(along: Floats, chords: _Chords) -> Floats:
+    chord = np.interp(along, *chords)
+    return np.asarray(np.arctan2(chord.imag, chord.real))

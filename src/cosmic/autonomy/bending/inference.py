@@ -431,10 +431,10 @@ def laid_out(readings: Readings, settings: FitSettings) -> LaidOut:
 
 def varied_covariance(readings: Readings, settings: FitSettings) -> Floats:
     """Return the covariance of a variation of 1, for each depth; shape (depths, m, m)."""
-    span, index = readings.span, np.ix_(readings.span, readings.span)
+    span = readings.span
     if len(set(span.tolist())) == 1:
         return np.zeros((DEPTHS, len(span), len(span)))
-    return np.asarray(laid_out(readings, settings).variation[:, *index])
+    return np.asarray(laid_out(readings, settings).variation[:, span[:, None], span])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

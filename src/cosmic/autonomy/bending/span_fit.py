@@ -13,7 +13,6 @@ from cosmic.autonomy.bending.branch import (
     Points,
     back_and_forth_percent,
     clear_points,
-    free_force_un,
     lost_while_pushing,
     points_of,
     rough,
@@ -96,7 +95,7 @@ class _Model:
         self._settings, self._friction = settings, friction
         depth = settings.offset_um
         self.length_um = shape.lever_um(depth)
-        first = rough(points, points.loading, free_force_un(points))
+        first = rough(points, points.loading, points.free_force_un)
         self.stroke_part = (
             max(float(np.max(points.probe_um)) - first.hinge_um, 0.0) / self.length_um
         )
@@ -219,7 +218,7 @@ class _Model:
 
     def fit(self) -> _Found:
         points, settings = self._points, self._settings
-        baseline = free_force_un(points)
+        baseline = points.free_force_un
         from scipy.optimize import leastsq  # half a second, at the first fit
 
         start: list[float] = []
@@ -299,7 +298,7 @@ def fit_span(
     points = points.but(clings(points, settings.drift_un_sqrt_s))
     points = points.but(_alone(points))
     if not touched(points, settings.drift_un_sqrt_s):
-        peak = float(np.max(points.force_un - free_force_un(points)))
+        peak = float(np.max(points.force_un - points.free_force_un))
         return _without_contact(span, place_um, peak)
     rub = settings.friction if friction is None else friction
     model = _Model(points, settings, span.shape or straight(place_um), rub)
