@@ -28,7 +28,7 @@ from cosmic.autonomy.bending.result import (
 )
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
-from cosmic.autonomy.bending.span_fit import fit_span
+from cosmic.autonomy.bending.span_fit import fit_spans
 from cosmic.autonomy.bending.standards import (
     UNKNOWN_GAIN,
     ForceScale,
@@ -147,10 +147,7 @@ def measure_fibre(
     if not spans:
         raise BendingError("there is no span to fit: measure at least one")
     positions = positions_um(spans)
-    fits = tuple(
-        fit_span(span, settings=settings, place_um=position, friction=friction)
-        for span, position in zip(spans, positions, strict=True)
-    )
+    fits = fit_spans(spans, settings=settings, places_um=positions, friction=friction)
     used = usable(fits)
     shapes = [spans[n].shape or straight(positions[n]) for n in used]
     if not shapes:

@@ -1,6 +1,7 @@
 """The model of a pushed cantilever, fitted to one span."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -11,6 +12,7 @@ from cosmic.autonomy.bending.branch import (
     CLEAR_SIGMAS,
     Mask,
     Points,
+    Rough,
     back_and_forth_percent,
     clear_points,
     lost_while_pushing,
@@ -21,7 +23,7 @@ from cosmic.autonomy.bending.branch import (
     touched,
 )
 from cosmic.autonomy.bending.branch import stuck as clings
-from cosmic.autonomy.bending.curved import NaturalShape, PushedCurve
+from cosmic.autonomy.bending.curved import OutAndBack, NaturalShape, PushedCurve, curves_of
 from cosmic.autonomy.bending.freed import freed_of
 from cosmic.autonomy.bending.response import straight
 from cosmic.autonomy.bending.result import Floats, Quality, SpanFit
@@ -85,27 +87,43 @@ class _Found:
     freedom: int
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pushed:
+    """A span that was touched, with a first look at its way out."""
+
+    points: Points
+    shape: NaturalShape
+    first: Rough
+    lever_um: float
+
+    @classmethod
+    def of(cls, points: Points, shape: NaturalShape, settings: FitSettings) -> "_Pushed":
+        first = rough(points, points.loading, points.free_force_un)
+        return cls(points, shape, first, shape.lever_um(settings.offset_um))
+
+    def gives_um3(self, settings: FitSettings) -> tuple[float, float]:
+        """Return how far the probe gives way along the fibre, and one that does not."""
+        ei_un_um2 = max(self.first.k_un_um, 0.0) * self.lever_um**3 / 3.0
+        return ei_un_um2 / settings.side_un_um, 0.0
+
+
 class _Model:
     """Force over way of one span, both ways; the fibre relaxes, and rubs on the probe."""
 
     def __init__(
-        self, points: Points, settings: FitSettings, shape: NaturalShape, friction: float
+        self,
+        pushed: _Pushed,
+        settings: FitSettings,
+        friction: float,
+        curves: tuple[OutAndBack, ...],
     ) -> None:
-        self._points = points
+        points = self._points = pushed.points
         self._settings, self._friction = settings, friction
-        depth = settings.offset_um
-        self.length_um = shape.lever_um(depth)
-        first = rough(points, points.loading, points.free_force_un)
+        self._first, self.length_um = pushed.first, pushed.lever_um
         self.stroke_part = (
-            max(float(np.max(points.probe_um)) - first.hinge_um, 0.0) / self.length_um
+            max(float(np.max(points.probe_um)) - pushed.first.hinge_um, 0.0) / self.length_um
         )
-        self.curves, self.stiff_probe = shape.curves_by_side(
-            depth_um=depth,
-            radius_um=settings.radius_um,
-            friction=friction,
-            ei_un_um2=max(first.k_un_um, 0.0) * self.length_um**3 / 3.0,
-            sides_um_un=(1.0 / settings.side_un_um, 0.0),
-        )
+        self.curves, self.stiff_probe = curves
         self._elapsed_s = points.time_s - points.time_s[0]
         self._lost = _lost(points.time_s)
         # A way back that never touches says where the baseline is, and nothing of the fibre.
@@ -223,7 +241,7 @@ class _Model:
 
         start: list[float] = []
         for branch in self.branches:
-            first = rough(points, branch, baseline)
+            first = rough(points, branch, baseline) if start else self._first
             if start and self.tied:
                 first = through_highest(points, branch, baseline, math.exp(start[0]))
             start += [math.log(max(first.k_un_um, 1e-4)), first.hinge_um]
@@ -277,31 +295,67 @@ def _lost(time_s: Floats) -> Floats:
     return np.asarray(-np.diff(of_steps, append=0.0))
 
 
-def fit_span(
-    span: Span, *, settings: FitSettings, place_um: float, friction: float | None = None
-) -> SpanFit:
-    """Fit one span.
+def fit_spans(
+    spans: Sequence[Span],
+    *,
+    settings: FitSettings,
+    places_um: Sequence[float],
+    friction: float | None = None,
+) -> tuple[SpanFit, ...]:
+    """Fit spans, each by itself.
 
     Parameters
     ----------
-    place_um : float
-        Its position along the fibre, as told in the result.
+    places_um : sequence of float
+        Their positions along the fibre, as told in the results.
     friction : float, optional
         About which the fit is laid out; that of the settings if None.
 
     Raises
     ------
     BendingError
-        The span is not whole, or the fibre slopes too much at the probe.
+        A span is not whole, or the fibre slopes too much at the probe.
     """
+    usable = [_usable(span, settings) for span in spans]
+    pushed = {
+        number: _Pushed.of(points, span.shape or straight(place_um), settings)
+        for number, (span, points, place_um) in enumerate(
+            zip(spans, usable, places_um, strict=True)
+        )
+        if touched(points, settings.drift_un_sqrt_s)
+    }
+    rub = settings.friction if friction is None else friction
+    curves = curves_of(
+        [(each.shape, each.gives_um3(settings)) for each in pushed.values()],
+        depth_um=settings.offset_um,
+        radius_um=settings.radius_um,
+        friction=rub,
+    )
+    models = {
+        number: _Model(each, settings, rub, laid)
+        for (number, each), laid in zip(pushed.items(), curves, strict=True)
+    }
+    return tuple(
+        _fitted(span, points, models.get(number), settings, place_um)
+        for number, (span, points, place_um) in enumerate(
+            zip(spans, usable, places_um, strict=True)
+        )
+    )
+
+
+def _usable(span: Span, settings: FitSettings) -> Points:
     points = points_of(span)
     points = points.but(clings(points, settings.drift_un_sqrt_s))
-    points = points.but(_alone(points))
-    if not touched(points, settings.drift_un_sqrt_s):
+    return points.but(_alone(points))
+
+
+def _fitted(
+    span: Span, points: Points, model: _Model | None, settings: FitSettings, place_um: float
+) -> SpanFit:
+    """Return the fit of one span; without a model it was not touched."""
+    if model is None:
         peak = float(np.max(points.force_un - points.free_force_un))
         return _without_contact(span, place_um, peak)
-    rub = settings.friction if friction is None else friction
-    model = _Model(points, settings, span.shape or straight(place_um), rub)
     found = model.fit()
     fit = _span_result(span, points, model, found, place_um)
     flags = _flags(span, fit, points, settings, model, found.values)
