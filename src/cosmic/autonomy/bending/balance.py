@@ -112,9 +112,9 @@ class _Pushes:
 
 @cache
 def _quadrature() -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Return points of the unit length and its end, weights, and turning by term.
+    """Return points of the unit length and its end, their weights, and what each term turns there.
 
-    The turning at the points, from them to the end, and weighed.
+    That once as it is, once as what is left of it until the end, and once weighed.
 
     Terms are integrals of Legendre polynomials: bent by one, the fibre does no work on another,
     and 1 on itself. All but the first are nothing at the end of the length.

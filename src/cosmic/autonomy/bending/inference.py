@@ -31,6 +31,8 @@ LOW_TAIL, HIGH_TAIL = 0.025, 0.975
 EXACT: Final = 1e-15
 """Of ln(EI): how near the ends of an interval are found."""
 
+MOST_TRIES: Final = 1000
+
 UNLIKELY: Final = 1e-3
 TWISTED: Final = 0.25
 """Of what friction does to a section askew: the part that differs between spans, by twist."""
@@ -512,7 +514,7 @@ def _quantile(weights: Floats, means: Floats, stds: Floats, part: float) -> floa
 
     if not low < high:
         return 0.5 * (low + high)
-    return float(brentq(more, low, high, xtol=EXACT, rtol=EXACT))
+    return float(brentq(more, low, high, xtol=EXACT, rtol=EXACT, maxiter=MOST_TRIES))
 
 
 def budget_of(

@@ -1,4 +1,4 @@
-"""The model of a pushed cantilever, fitted to one span."""
+"""The model of a pushed cantilever, fitted to spans, each by itself."""
 
 import math
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from cosmic.autonomy.bending.branch import (
     touched,
 )
 from cosmic.autonomy.bending.branch import stuck as clings
-from cosmic.autonomy.bending.curved import OutAndBack, NaturalShape, PushedCurve, curves_of
+from cosmic.autonomy.bending.curved import NaturalShape, OutAndBack, PushedCurve, curves_of
 from cosmic.autonomy.bending.freed import freed_of
 from cosmic.autonomy.bending.response import straight
 from cosmic.autonomy.bending.result import Floats, Quality, SpanFit
