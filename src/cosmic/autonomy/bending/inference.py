@@ -371,24 +371,23 @@ def evidence_of(readings: Readings, common: Common, settings: FitSettings) -> Ev
     """Return the evidence of a fibre's readings."""
     span = readings.span
     depths = depths_of(settings)
-    geometry = laid_out(readings, settings).log_stiffness[:, span]
+    laid = laid_out(readings, settings)
+    geometry = laid.log_stiffness[:, span]
     known = readings.to_common @ common.mean + own_mean(readings)
     away = readings.log_k - geometry - known
-    total = np.broadcast_to(
-        fixed_covariance(readings, common), (len(depths), 1, *(2 * (len(span),)))
-    )
-    varied = varied_covariance(readings, settings)
+    total = fixed_covariance(readings, common)
+    varied = laid.variation[:, span[:, None], span]
     variations = VARIATIONS if readings.certified is None else VARIATIONS[:1]
     whole = total + varied[:, None] * (variations**2)[None, :, None, None]
     ones = np.ones(len(span))
-    root = np.linalg.inv(whole)
+    root = np.linalg.inv(whole)[laid.nearest]
     each = root @ ones
     weight = each @ ones
     if readings.certified is not None:
         log_ei, std = readings.certified
         off = away[:, None, :] - log_ei
         whole = whole + std**2
-        root = np.linalg.inv(whole)
+        root = np.linalg.inv(whole)[laid.nearest]
         chi2 = np.einsum(
             "dvi,dvij,dvj->dv",
             np.broadcast_to(off, root.shape[:3]),
@@ -402,7 +401,7 @@ def evidence_of(readings: Readings, common: Common, settings: FitSettings) -> Ev
         off = away[:, None, :] - best[:, :, None]
         chi2 = np.einsum("dvi,dvij,dvj->dv", off, root, off)
         extra, variance = np.log(weight), 1.0 / weight
-    likely = -0.5 * (chi2 + np.linalg.slogdet(whole)[1] + extra)
+    likely = -0.5 * (chi2 + np.linalg.slogdet(whole)[1][laid.nearest] + extra)
     return Evidence(depths, np.asarray(likely), best, variance, chi2, len(span) - 1)
 
 
@@ -433,10 +432,8 @@ def laid_out(readings: Readings, settings: FitSettings) -> LaidOut:
 
 def varied_covariance(readings: Readings, settings: FitSettings) -> Floats:
     """Return the covariance of a variation of 1, for each depth; shape (depths, m, m)."""
-    span = readings.span
-    if len(set(span.tolist())) == 1:
-        return np.zeros((DEPTHS, len(span), len(span)))
-    return np.asarray(laid_out(readings, settings).variation[:, span[:, None], span])
+    span, laid = readings.span, laid_out(readings, settings)
+    return np.asarray(laid.variation[:, span[:, None], span][laid.nearest])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

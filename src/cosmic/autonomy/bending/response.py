@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.bending.result import BendingError, Floats
@@ -27,12 +28,15 @@ class LaidOut:
     ----------
     log_stiffness : ndarray, shape (depths, n), float64
         As `Response.log_stiffness` returns it.
-    variation : ndarray, shape (depths, n, n), float64
-        As `Response.variation` returns it for the nearest of the depths that it is known for.
+    variation : ndarray, shape (few, n, n), float64
+        As `Response.variation` returns it for a few of the depths.
+    nearest : ndarray, shape (depths,), int
+        Which of the few stands for each depth.
     """
 
     log_stiffness: Floats
     variation: Floats
+    nearest: npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +107,7 @@ class Response:
             few = depths_um[::every]
             coarse = np.array([self.variation(float(each), length_um, reference) for each in few])
             nearest = np.abs(np.log(depths_um[:, None] / few[None, :])).argmin(axis=1)
-            found = LaidOut(self.log_stiffness(depths_um), coarse[nearest])
+            found = LaidOut(self.log_stiffness(depths_um), coarse, nearest)
             self._last.clear()
             self._last[asked] = found
         return found
