@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -19,7 +20,7 @@ FREE_PART: Final = 0.125
 """Of a way: the part that the probe is taken to be free on."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Points:
     """The usable points of a span, in the order of time.
 
@@ -35,6 +36,20 @@ class Points:
     time_s: Floats
     loading: Mask
     kept: Mask
+
+    @cached_property
+    def free_force_un(self) -> Floats:
+        """Baseline at each time, from where the probe was farthest from the fibre."""
+        ends = []
+        for branch in (self.loading, ~self.loading):
+            if branch.any():
+                probes, forces, times = (
+                    values[branch] for values in (self.probe_um, self.force_un, self.time_s)
+                )
+                free = np.argsort(probes, kind="stable")[: max(2, round(FREE_PART * len(probes)))]
+                ends.append((float(np.mean(times[free])), float(np.median(forces[free]))))
+        times_s, levels = zip(*sorted(ends), strict=True)
+        return np.asarray(np.interp(self.time_s, times_s, levels), dtype=np.float64)
 
     def but(self, mask: Mask) -> "Points":
         """Return these points without those of `mask`."""
@@ -97,20 +112,6 @@ def points_of(span: Span) -> Points:
     )
 
 
-def free_force_un(points: Points) -> Floats:
-    """Return the baseline at each time, from where the probe was farthest from the fibre."""
-    ends = []
-    for branch in (points.loading, ~points.loading):
-        if branch.any():
-            probes, forces, times = (
-                values[branch] for values in (points.probe_um, points.force_un, points.time_s)
-            )
-            free = np.argsort(probes, kind="stable")[: max(2, round(FREE_PART * len(probes)))]
-            ends.append((float(np.mean(times[free])), float(np.median(forces[free]))))
-    times_s, levels = zip(*sorted(ends), strict=True)
-    return np.asarray(np.interp(points.time_s, times_s, levels), dtype=np.float64)
-
-
 def stuck(points: Points, drift_un_sqrt_s: float) -> Mask:
     """Return where the fibre clings to the probe that goes back, and pulls.
 
@@ -167,7 +168,7 @@ def touched(points: Points, drift_un_sqrt_s: float) -> bool:
     """Return whether neighbouring points rise clearly above the baseline on the way out."""
     out = points.loading if points.loading.sum() >= NEIGHBOURS else np.ones_like(points.loading)
     order = np.argsort(points.probe_um[out], kind="stable")
-    height = (points.force_un - free_force_un(points))[out][order]
+    height = (points.force_un - points.free_force_un)[out][order]
     mean = np.convolve(height, np.full(NEIGHBOURS, 1.0 / NEIGHBOURS), mode="valid")
     took_s = float(np.ptp(points.time_s[out]))
     noise = math.hypot(
@@ -178,7 +179,7 @@ def touched(points: Points, drift_un_sqrt_s: float) -> bool:
 
 def clear_points(points: Points, travel: Mask) -> int:
     """Return how many points of one way stand clear of the baseline."""
-    height = (points.force_un - free_force_un(points))[travel]
+    height = (points.force_un - points.free_force_un)[travel]
     return int(np.sum(height > CLEAR_SIGMAS * points.std_un[travel]))
 
 
@@ -195,7 +196,7 @@ def lost_while_pushing(points: Points, position_std_um: float) -> bool:
     position reads another force.
     """
     out = points.loading
-    height = (points.force_un - free_force_un(points))[out]
+    height = (points.force_un - points.free_force_un)[out]
     travel, std = points.probe_um[out], points.std_un[out]
     if len(travel) < 3:
         return False

@@ -18,6 +18,7 @@ from cosmic.autonomy.bending.inference import (
     Readings,
     excess_of,
     fixed_covariance,
+    laid_out,
     own_mean,
     varied_covariance,
 )
@@ -159,7 +160,7 @@ def _linear(readings: Readings, assessed: Assessed, settings: FitSettings) -> tu
     posterior, depths = assessed.posterior, assessed.evidence.depths_um
     here = int(np.unravel_index(posterior.weights.argmax(), posterior.weights.shape)[0])
     here = min(max(here, 1), len(depths) - 2)
-    geometry = readings.response.log_stiffness(depths[here - 1 : here + 2])[:, readings.span]
+    geometry = laid_out(readings, settings).log_stiffness[here - 1 : here + 2, readings.span]
     by_depth = (geometry[2] - geometry[0]) / float(np.log(depths[here + 1] / depths[here - 1]))
     whole = fixed_covariance(readings, assessed.common) + np.outer(by_depth, by_depth)
     small = float(VARIATIONS[2])

@@ -1,50 +1,30 @@
-"""How a curled fibre gives way to a round edge that pushes it: a weak form, by Ritz' method.
+"""How a curled fibre gives way to a round edge that pushes it.
 
-A probe without friction pushes along the fibre's normal at the contact. The turning of the fibre
-against its natural shape is sought as a polynomial of the length; for each force it makes the
-virtual work of bending and of the push equal. The slope of the curve at its begin is known in
-closed form: with b the natural slope at the contact, and X and Y the distances of an element from
-it, 1/k = 1/(EI cos^2 b) times the integral of (X cos b + Y sin b)^2 over the length.
+Force over deflection follows from the equilibria under many loads. The slope of the curve at its
+begin is known in closed form: with b the natural slope at the contact, and X and Y the distances
+of an element from it, 1/k = 1/(EI cos^2 b) times the integral of (X cos b + Y sin b)^2 over the
+length.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.autonomy.bending.balance import LOADS, PushedFibre, balanced
 from cosmic.autonomy.bending.result import BendingError, Floats
 
-POWERS: Final = np.arange(1, 8)
-"""Of the length, in the polynomial; the turning is nothing at the clamp."""
-
-POINTS: Final = 20
-LOADS: Final = 40
-HEAVIEST: Final = 1.3
-"""Load in units of EI/lever^2; the deflection reaches 0.4 of the lever."""
-
-ROUNDS: Final = 40
-MET_PART: Final = 1e-6
-"""Of the lever: how near the contact must come to the probe."""
-
-LEAST_COS: Final = 0.2
-TURNS: Final = 3
 DIRECTION_UM: Final = 40.0
 """Length to both sides of a place over which its direction is taken."""
 
+MET_ENOUGH_PART: Final = 1e-3
+"""Of the lever: where the contact stays farther from the probe, the fibre slides off."""
 
 Mask = npt.NDArray[np.bool_]
-
-
-@cache
-def _quadrature() -> tuple[Floats, Floats, Floats, Floats]:
-    """Return points of the unit length, their weights, the powers there, and bending inverted."""
-    nodes, weights = np.polynomial.legendre.leggauss(POINTS)
-    part = 0.5 * (nodes + 1.0)
-    bending = POWERS[:, None] * POWERS / (POWERS[:, None] + POWERS - 1.0)
-    return part, 0.5 * weights, part[:, None] ** POWERS, np.linalg.inv(bending)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,10 +95,10 @@ class NaturalShape:
         steps = np.hypot(np.diff(self.ahead_um), np.diff(self.aside_um))
         return np.concatenate([[0.0], np.cumsum(steps)])
 
-    @property
+    @cached_property
     def slope_rad(self) -> float:
         """Natural direction at the probe, positive where the fibre runs towards it."""
-        return float(self._headings(np.array([self._arc_at(self.at_um)]))[0])
+        return float(np.angle(self._chords(np.array([self._arc_at(self.at_um)])))[0])
 
     def lever_um(self, depth_um: float = 0.0) -> float:
         """Return the length of a straight fibre that gives way as much to a small push.
@@ -132,14 +112,23 @@ class NaturalShape:
 
     def levers_um(self, depths_um: Floats) -> Floats:
         """Return the lever for each of several depths of the clamp."""
-        along, arms = self.arms_um()
-        first, second = arms[:-1], arms[1:]
-        free = float(((first * first + first * second + second * second) * np.diff(along)).sum())
+        arm = self._arms[1][0]
         # Between the jaws the fibre is straight: its part of the integral is a cube.
-        return np.asarray(np.cbrt(free + (arms[0] + depths_um) ** 3 - arms[0] ** 3))
+        return np.asarray(np.cbrt(self._free_um3 + (arm + depths_um) ** 3 - arm**3))
 
     def arms_um(self) -> tuple[Floats, Floats]:
         """Return lengths from the jaws' tip to the contact, and the arm of a push about each."""
+        return self._arms
+
+    @cached_property
+    def _free_um3(self) -> float:
+        """Integral over the square of the arm from the jaws' tip on, three times."""
+        along, arms = self._arms
+        first, second = arms[:-1], arms[1:]
+        return float(((first * first + first * second + second * second) * np.diff(along)).sum())
+
+    @cached_property
+    def _arms(self) -> tuple[Floats, Floats]:
         end = self._arc_at(self.at_um)
         along = np.unique(np.concatenate([[0.0], self._arcs[self._arcs < end], [end]]))
         x, y = self._places(along)
@@ -184,76 +173,23 @@ class NaturalShape:
         BendingError
             The fibre slides off.
         """
-        lever = self.lever_um(depth_um)
-        one = np.linspace(0.0, 1.0, LOADS) ** 1.5 * (HEAVIEST / lever**2)
-        loads, rub = np.tile(one, 2), np.repeat([math.atan(friction), -math.atan(friction)], LOADS)
-        ends = np.full(2 * LOADS, self._arc_at(self.at_um))
-        aside = ei_un_um2 * side_um_un
-        factors = np.zeros((2 * LOADS, len(POWERS)))
-        off, contact = np.zeros(2 * LOADS), np.zeros(2 * LOADS)
-        y, across = off, off
-        for _ in range(ROUNDS):
-            ends = ends + np.clip(off / np.maximum(np.cos(contact), LEAST_COS), -20.0, 20.0)
-            x, y, across, contact, factors = self._bent(
-                ends, loads, rub, factors, depth_um, radius_um
-            )
-            off = self.at_um - aside * loads * np.sin(contact + rub) - x
-            if np.abs(off).max() < MET_PART * lever:
-                break
-        wandered = (ends - radius_um * contact).reshape(2, LOADS).mean(axis=0)
-        inwards = wandered < wandered[0]
-        good = (np.abs(off) < 1e-3 * lever).reshape(2, LOADS)
-        both = []
-        for first in (0, 1):
-            chosen = np.where(inwards, 1 - first, first) * LOADS + np.arange(LOADS)
-            both.append(self._pushed(y[chosen], across[chosen], good.ravel()[chosen], lever=lever))
-        return both[0], both[1]
+        ((both,),) = curves_of(
+            [(self, (ei_un_um2 * side_um_un,))],
+            depth_um=depth_um,
+            radius_um=radius_um,
+            friction=friction,
+        )
+        return both
 
-    def _pushed(self, y: Floats, across: Floats, good: Mask, *, lever: float) -> PushedCurve:
-        deflection = y[0] - y
-        good = good.copy()
-        good[1:] &= (np.diff(deflection) > 0.0) & (np.diff(across) > 0.0)
-        last = LOADS if good.all() else int(good.argmin())
-        if last < 3:
-            raise BendingError(
-                f"the fibre lies at {math.degrees(self.slope_rad):.0f} deg to the jaws at the "
-                "probe: it slides off instead of bending; push it nearer to the jaws"
-            )
-        return PushedCurve(deflection[:last] / lever, across[:last] * lever**2 / 3.0)
-
-    def _bent(
-        self,
-        ends: Floats,
-        loads: Floats,
-        rub: Floats,
-        factors: Floats,
-        depth_um: float,
-        radius_um: float,
-    ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-        """Take one step towards equilibrium.
-
-        Returns the middle of the probe, x and y, the force across over EI, the direction at the
-        contact, and the polynomial, by load.
-        """
-        part, weight, shapes, given = _quadrature()
-        lengths = (ends + depth_um)[:, None]
-        natural = self._headings(lengths * part - depth_um)
-        at_end = self._headings(ends)
-        for _ in range(TURNS):
-            heading = natural + factors @ shapes.T
-            pushes = (at_end + factors.sum(axis=1) + rub)[:, None]
-            work = (np.cos(pushes - heading) * weight) @ shapes
-            factors = -(loads[:, None] * lengths**2) * (work @ given)
-        heading = natural + factors @ shapes.T
-        contact = at_end + factors.sum(axis=1)
-        x = (np.cos(heading) * weight).sum(axis=1) * lengths[:, 0] - depth_um
-        y = (np.sin(heading) * weight).sum(axis=1) * lengths[:, 0]
-        return (
-            x - radius_um * np.sin(contact),
-            y + radius_um * np.cos(contact),
-            loads * np.cos(contact + rub),
-            contact,
-            factors,
+    def pushed_by(self, gives_um3: Sequence[float], depth_um: float) -> PushedFibre:
+        """Return what its equilibria follow from; see `PushedFibre`."""
+        along = np.unique(np.concatenate([self._arcs - DIRECTION_UM, self._arcs + DIRECTION_UM]))
+        return PushedFibre(
+            chords=(along, self._chords(along)),
+            at_um=self.at_um,
+            arc_um=self._arc_at(self.at_um),
+            lever_um=self.lever_um(depth_um),
+            gives_um3=gives_um3,
         )
 
     def _arc_at(self, ahead_um: float) -> float:
@@ -269,6 +205,63 @@ class NaturalShape:
         y = np.interp(along, arcs, self.aside_um) + over * last[1] / step
         return x, y
 
-    def _headings(self, along: Floats) -> Floats:
+    def _chords(self, along: Floats) -> npt.NDArray[np.complex128]:
         before, after = self._places(along - DIRECTION_UM), self._places(along + DIRECTION_UM)
-        return np.asarray(np.arctan2(after[1] - before[1], after[0] - before[0]))
+        return np.asarray((after[0] - before[0]) + 1j * (after[1] - before[1]))
+
+
+OutAndBack = tuple[PushedCurve, PushedCurve]
+"""Of the way out and the way back."""
+
+
+def curves_of(
+    pushes: Sequence[tuple[NaturalShape, Sequence[float]]],
+    *,
+    depth_um: float,
+    radius_um: float,
+    friction: float,
+) -> tuple[tuple[OutAndBack, ...], ...]:
+    """Return what `NaturalShape.curves` does, for several shapes, each pushed by several probes.
+
+    Parameters
+    ----------
+    pushes : sequence of (NaturalShape, sequence of float)
+        With how far each probe gives way along the jaws for a force of EI times 1/um2, um3; as many
+        probes for each shape.
+
+    Raises
+    ------
+    BendingError
+        A fibre slides off.
+    """
+    if not pushes:
+        return ()
+    fibres = [shape.pushed_by(gives, depth_um) for shape, gives in pushes]
+    found = balanced(fibres, friction=friction, depth_um=depth_um, radius_um=radius_um)
+    wandered = (found.ends_um - radius_um * found.contact_rad).mean(axis=2)
+    inwards = wandered < wandered[..., :1]
+
+    def curve(fibre: int, probe: int, first: int) -> PushedCurve:
+        here = fibre, probe, np.where(inwards[fibre, probe], 1 - first, first), np.arange(LOADS)
+        lever = fibres[fibre].lever_um
+        met = np.abs(found.off_um[here]) < MET_ENOUGH_PART * lever
+        across, pushed = found.across_um[here], found.pushed[here]
+        return _curve(pushes[fibre][0], across, pushed, met, lever)
+
+    return tuple(
+        tuple((curve(fibre, probe, 0), curve(fibre, probe, 1)) for probe in range(len(gives)))
+        for fibre, (_, gives) in enumerate(pushes)
+    )
+
+
+def _curve(shape: NaturalShape, y: Floats, across: Floats, met: Mask, lever: float) -> PushedCurve:
+    deflection = y[0] - y
+    good = met.copy()
+    good[1:] &= (np.diff(deflection) > 0.0) & (np.diff(across) > 0.0)
+    last = LOADS if good.all() else int(good.argmin())
+    if last < 3:
+        raise BendingError(
+            f"the fibre lies at {math.degrees(shape.slope_rad):.0f} deg to the jaws at the "
+            "probe: it slides off instead of bending; push it nearer to the jaws"
+        )
+    return PushedCurve(deflection[:last] / lever, across[:last] * lever**2 / 3.0)

@@ -17,7 +17,7 @@ from cosmic.autonomy.bending.inference import (
     readings_of,
 )
 from cosmic.autonomy.bending.population import Assessed, Population, assess
-from cosmic.autonomy.bending.response import direction_by_touch, response_of, straight
+from cosmic.autonomy.bending.response import Response, direction_by_touch, response_of, straight
 from cosmic.autonomy.bending.result import (
     N_M2_PER_UN_UM2,
     UN_UM2_PER_N_M2,
@@ -28,7 +28,7 @@ from cosmic.autonomy.bending.result import (
 )
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
-from cosmic.autonomy.bending.span_fit import fit_span
+from cosmic.autonomy.bending.span_fit import fit_spans
 from cosmic.autonomy.bending.standards import (
     UNKNOWN_GAIN,
     ForceScale,
@@ -115,6 +115,7 @@ class MeasuredFibre:
             part=self.part,
             certificate=self.certificate,
             friction=friction,
+            known=self.readings.response if self.readings is not None else None,
         )
 
 
@@ -125,6 +126,7 @@ def measure_fibre(
     part: float = 0.0,
     certificate: Certificate | None = None,
     friction: float | None = None,
+    known: Response | None = None,
 ) -> MeasuredFibre:
     """Return what each span of a fibre, or of a standard, says by itself.
 
@@ -134,6 +136,8 @@ def measure_fibre(
         Of the campaign that was over, 0 to 1.
     friction : float, optional
         About which spans are fitted; that of the settings if None.
+    known : Response, optional
+        Of the same spans with the same settings: taken where the fit stands on the same of them.
 
     Raises
     ------
@@ -143,22 +147,20 @@ def measure_fibre(
     if not spans:
         raise BendingError("there is no span to fit: measure at least one")
     positions = positions_um(spans)
-    fits = tuple(
-        fit_span(span, settings=settings, place_um=position, friction=friction)
-        for span, position in zip(spans, positions, strict=True)
-    )
+    fits = fit_spans(spans, settings=settings, places_um=positions, friction=friction)
     used = usable(fits)
     shapes = [spans[n].shape or straight(positions[n]) for n in used]
     if not shapes:
         return MeasuredFibre(fits, (), None, tuple(spans), settings, part, certificate)
-    response = response_of(shapes, depth_um=settings.offset_um)
+    if known is None or known.shapes != tuple(shapes):
+        known = response_of(shapes, depth_um=settings.offset_um)
     certified = None
     if certificate is not None:
         log_ei = math.log(certificate.ei_n_m2 * UN_UM2_PER_N_M2)
         certified = log_ei, certificate.expanded_part / 2.0
-    known = all(spans[n].shape is not None for n in used)
+    seen = all(spans[n].shape is not None for n in used)
     direction = direction_by_touch(
-        shapes if known else [],
+        shapes if seen else [],
         np.array([fits[n].hinge_um for n in used]),
         radius_um=settings.radius_um,
         noise_um=settings.touch_std_um,
@@ -166,7 +168,7 @@ def measure_fibre(
     )
     readings = readings_of(
         [fits[n] for n in used],
-        response,
+        known,
         settings,
         part=part,
         certified=certified,

@@ -25,6 +25,7 @@ from cosmic.autonomy.bending.inference import (
     depth_prior,
     evidence_of,
     fixed_covariance,
+    laid_out,
     own_mean,
     posterior_of,
     varied_covariance,
@@ -252,7 +253,7 @@ class _Said:
         posterior = assessed.posterior
         here = int(np.abs(np.log(depths / posterior.depth_um)).argmin())
         here = min(max(here, 1), len(depths) - 2)
-        geometry = read.response.log_stiffness(depths[here - 1 : here + 2])[:, read.span]
+        geometry = laid_out(read, settings).log_stiffness[here - 1 : here + 2, read.span]
         step = float(np.log(depths[here + 1] / depths[here - 1]))
         by_depth = (geometry[2] - geometry[0]) / step
         of_depth = weight.sum(axis=1) / weight.sum()

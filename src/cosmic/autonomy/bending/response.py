@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.bending.result import BendingError, Floats
@@ -17,6 +18,25 @@ BEYOND: Final = 1.5
 LEAST_TOUCHES: Final = 3
 DISAGREE_TIMES: Final = 4.0
 """Of what the image may be wrong by: beyond that both witnesses are doubted, and neither taken."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LaidOut:
+    """What n spans answer at several depths of the clamp.
+
+    Attributes
+    ----------
+    log_stiffness : ndarray, shape (depths, n), float64
+        As `Response.log_stiffness` returns it.
+    variation : ndarray, shape (few, n, n), float64
+        As `Response.variation` returns it for a few of the depths.
+    nearest : ndarray, shape (depths,), int
+        Which of the few stands for each depth.
+    """
+
+    log_stiffness: Floats
+    variation: Floats
+    nearest: npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +59,9 @@ class Response:
     by_direction: Floats
     by_square: Floats
     slopes: Floats
+    _last: dict[tuple[float | bytes, ...], LaidOut] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     def log_stiffness(self, depths_um: Floats) -> Floats:
         """Return ln(k / EI) of each span for depths of the clamp, shape (depths, n)."""
@@ -67,6 +90,27 @@ class Response:
         alike = np.exp(-np.abs(middles[:, None] - middles[None, :]) / length_um)
         off = weights - weights[reference]
         return np.asarray(off @ alike @ off.T)
+
+    def laid_out(
+        self, depths_um: Floats, length_um: float, reference: int, *, every: int
+    ) -> LaidOut:
+        """Return stiffness and variation at each depth; kept until it is asked for others.
+
+        Parameters
+        ----------
+        every : int
+            Of so many depths the variation is found for one: it changes little with depth.
+        """
+        asked = depths_um.tobytes(), length_um, reference, every
+        found = self._last.get(asked)
+        if found is None:
+            few = depths_um[::every]
+            coarse = np.array([self.variation(float(each), length_um, reference) for each in few])
+            nearest = np.abs(np.log(depths_um[:, None] / few[None, :])).argmin(axis=1)
+            found = LaidOut(self.log_stiffness(depths_um), coarse, nearest)
+            self._last.clear()
+            self._last[asked] = found
+        return found
 
 
 def straight(at_um: float) -> NaturalShape:

@@ -1,6 +1,7 @@
-"""The model of a pushed cantilever, fitted to one span."""
+"""The model of a pushed cantilever, fitted to spans, each by itself."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -11,9 +12,9 @@ from cosmic.autonomy.bending.branch import (
     CLEAR_SIGMAS,
     Mask,
     Points,
+    Rough,
     back_and_forth_percent,
     clear_points,
-    free_force_un,
     lost_while_pushing,
     points_of,
     rough,
@@ -22,7 +23,7 @@ from cosmic.autonomy.bending.branch import (
     touched,
 )
 from cosmic.autonomy.bending.branch import stuck as clings
-from cosmic.autonomy.bending.curved import NaturalShape, PushedCurve
+from cosmic.autonomy.bending.curved import NaturalShape, OutAndBack, PushedCurve, curves_of
 from cosmic.autonomy.bending.freed import freed_of
 from cosmic.autonomy.bending.response import straight
 from cosmic.autonomy.bending.result import Floats, Quality, SpanFit
@@ -30,6 +31,12 @@ from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
 
 ROUNDS: Final = 2
+ENOUGH: Final = 1e-8
+"""Of values and sum of squares: a change that ends a round."""
+
+ALIKE_PART: Final = 1e-20
+"""Of a column's square: what is left of one that says nothing new."""
+
 LEAST_OF_A_BRANCH: Final = 3
 LEAST_CLEAR: Final = 2
 CLOSE_SIGMAS: Final = 2.5
@@ -80,28 +87,43 @@ class _Found:
     freedom: int
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pushed:
+    """A span that was touched, with a first look at its way out."""
+
+    points: Points
+    shape: NaturalShape
+    first: Rough
+    lever_um: float
+
+    @classmethod
+    def of(cls, points: Points, shape: NaturalShape, settings: FitSettings) -> "_Pushed":
+        first = rough(points, points.loading, points.free_force_un)
+        return cls(points, shape, first, shape.lever_um(settings.offset_um))
+
+    def gives_um3(self, settings: FitSettings) -> tuple[float, float]:
+        """Return how far the probe gives way along the fibre, and one that does not."""
+        ei_un_um2 = max(self.first.k_un_um, 0.0) * self.lever_um**3 / 3.0
+        return ei_un_um2 / settings.side_un_um, 0.0
+
+
 class _Model:
     """Force over way of one span, both ways; the fibre relaxes, and rubs on the probe."""
 
     def __init__(
-        self, points: Points, settings: FitSettings, shape: NaturalShape, friction: float
+        self,
+        pushed: _Pushed,
+        settings: FitSettings,
+        friction: float,
+        curves: tuple[OutAndBack, ...],
     ) -> None:
-        self._points = points
+        points = self._points = pushed.points
         self._settings, self._friction = settings, friction
-        depth = settings.offset_um
-        self.length_um = shape.lever_um(depth)
-        first = rough(points, points.loading, free_force_un(points))
+        self._first, self.length_um = pushed.first, pushed.lever_um
         self.stroke_part = (
-            max(float(np.max(points.probe_um)) - first.hinge_um, 0.0) / self.length_um
+            max(float(np.max(points.probe_um)) - pushed.first.hinge_um, 0.0) / self.length_um
         )
-        about = {
-            "depth_um": depth,
-            "radius_um": settings.radius_um,
-            "friction": friction,
-            "ei_un_um2": max(first.k_un_um, 0.0) * self.length_um**3 / 3.0,
-        }
-        self.curves = shape.curves(**about, side_um_un=1.0 / settings.side_un_um)
-        self.stiff_probe = shape.curves(**about)
+        self.curves, self.stiff_probe = curves
         self._elapsed_s = points.time_s - points.time_s[0]
         self._lost = _lost(points.time_s)
         # A way back that never touches says where the baseline is, and nothing of the fibre.
@@ -116,7 +138,7 @@ class _Model:
             log_k, hinge_um = values[2 * number], values[2 * number + 1]
             ahead = self._points.probe_um[branch] - hinge_um
             force[branch] = self._force(ahead, log_k, self.curves[number])
-        return np.asarray(force - values[-1] * (self._lost @ np.diff(force, prepend=0.0)))
+        return np.asarray(force - values[-1] * (self._lost @ force))
 
     def _force(self, ahead_um: Floats, log_k: float, curve: PushedCurve) -> Floats:
         return curve.force_un(
@@ -128,14 +150,21 @@ class _Model:
 
     def slopes(self, values: Floats) -> Floats:
         """Return the derivatives of the force to each value, shape (points, values)."""
-        found = np.zeros((len(self._points.probe_um), len(values)))
-        here = self.contact(values)
-        for number in (*range(2 * len(self.branches)), len(values) - 1):
-            more = values.copy()
-            more[number] += TINY
-            found[:, number] = (self.contact(more) - here) / TINY
-        found[:, -3], found[:, -2] = 1.0, self._elapsed_s
-        return found
+        count = 2 * len(self.branches)
+        force = np.zeros(len(self._points.probe_um))
+        by_value = np.zeros((len(values), len(force)))
+        for number, branch in enumerate(self.branches):
+            curve, (log_k, hinge_um) = self.curves[number], values[2 * number : 2 * number + 2]
+            probe = self._points.probe_um[branch]
+            ahead, nearer = probe - hinge_um, probe - (hinge_um + TINY)
+            here, there = self._force(np.stack([ahead, nearer]), log_k, curve)
+            stiffer = self._force(ahead, log_k + TINY, curve)
+            force[branch] = here
+            by_value[2 * number, branch] = (stiffer - here) / TINY
+            by_value[2 * number + 1, branch] = (there - here) / TINY
+        by_value[:count] -= values[-1] * (by_value[:count] @ self._lost.T)
+        by_value[-3], by_value[-2], by_value[-1] = 1.0, self._elapsed_s, -(self._lost @ force)
+        return by_value.T
 
     def total(self, values: Floats) -> Floats:
         return np.asarray(self.contact(values) + self.baseline(values), dtype=np.float64)
@@ -207,12 +236,12 @@ class _Model:
 
     def fit(self) -> _Found:
         points, settings = self._points, self._settings
-        baseline = free_force_un(points)
-        from scipy.optimize import least_squares  # half a second, at the first fit
+        baseline = points.free_force_un
+        from scipy.optimize import leastsq  # half a second, at the first fit
 
         start: list[float] = []
         for branch in self.branches:
-            first = rough(points, branch, baseline)
+            first = rough(points, branch, baseline) if start else self._first
             if start and self.tied:
                 first = through_highest(points, branch, baseline, math.exp(start[0]))
             start += [math.log(max(first.k_un_um, 1e-4)), first.hinge_um]
@@ -235,11 +264,18 @@ class _Model:
             def slopes(tried: Floats, whiten: Floats = whiten) -> Floats:
                 return np.vstack([-whiten @ self.slopes(tried), -known, -tie])
 
-            found = least_squares(
-                misfit, values, jac=slopes, method="lm", x_scale="jac", max_nfev=200
+            values, _, found, _, _ = leastsq(
+                misfit,
+                values,
+                Dfun=slopes,
+                full_output=True,
+                ftol=ENOUGH,
+                xtol=ENOUGH,
+                gtol=ENOUGH,
+                maxfev=200,
             )
-            values, jacobian = found.x, found.jac
-            chi2 = float((found.fun[:-2] ** 2).sum())
+            jacobian = slopes(values)
+            chi2 = float((found["fvec"][:-2] ** 2).sum())
         weak = np.array([*BRANCH_STDS * len(self.branches), *BASELINE_STDS, 1.0]) ** -2.0
         information = jacobian.T @ jacobian + np.diag(weak)
         covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
@@ -248,40 +284,78 @@ class _Model:
 
 
 def _lost(time_s: Floats) -> Floats:
-    """Return what of each step of force is lost at each time, for a part of 1 in a tenfold time.
+    """Return what is lost at each time of the force at each, for a part of 1 in a tenfold time.
 
-    Counted from `RELAXED_AT_S` after the step: stiffness is what a fibre shows then.
+    Each step of the force counts from `RELAXED_AT_S` after it: stiffness is what a fibre shows
+    then.
     """
     middles = time_s - 0.5 * np.diff(time_s, prepend=2.0 * time_s[0] - time_s[1])
     since = (time_s[:, None] - middles[None, :]) / RELAXED_AT_S
-    return np.where(since > 0.0, np.log10(np.maximum(since, 1e-3)), 0.0)
+    of_steps = np.where(since > 0.0, np.log10(np.maximum(since, 1e-3)), 0.0)
+    return np.asarray(-np.diff(of_steps, append=0.0))
 
 
-def fit_span(
-    span: Span, *, settings: FitSettings, place_um: float, friction: float | None = None
-) -> SpanFit:
-    """Fit one span.
+def fit_spans(
+    spans: Sequence[Span],
+    *,
+    settings: FitSettings,
+    places_um: Sequence[float],
+    friction: float | None = None,
+) -> tuple[SpanFit, ...]:
+    """Fit spans, each by itself.
 
     Parameters
     ----------
-    place_um : float
-        Its position along the fibre, as told in the result.
+    places_um : sequence of float
+        Their positions along the fibre, as told in the results.
     friction : float, optional
         About which the fit is laid out; that of the settings if None.
 
     Raises
     ------
     BendingError
-        The span is not whole, or the fibre slopes too much at the probe.
+        A span is not whole, or the fibre slopes too much at the probe.
     """
+    usable = [_usable(span, settings) for span in spans]
+    pushed = {
+        number: _Pushed.of(points, span.shape or straight(place_um), settings)
+        for number, (span, points, place_um) in enumerate(
+            zip(spans, usable, places_um, strict=True)
+        )
+        if touched(points, settings.drift_un_sqrt_s)
+    }
+    rub = settings.friction if friction is None else friction
+    curves = curves_of(
+        [(each.shape, each.gives_um3(settings)) for each in pushed.values()],
+        depth_um=settings.offset_um,
+        radius_um=settings.radius_um,
+        friction=rub,
+    )
+    models = {
+        number: _Model(each, settings, rub, laid)
+        for (number, each), laid in zip(pushed.items(), curves, strict=True)
+    }
+    return tuple(
+        _fitted(span, points, models.get(number), settings, place_um)
+        for number, (span, points, place_um) in enumerate(
+            zip(spans, usable, places_um, strict=True)
+        )
+    )
+
+
+def _usable(span: Span, settings: FitSettings) -> Points:
     points = points_of(span)
     points = points.but(clings(points, settings.drift_un_sqrt_s))
-    points = points.but(_alone(points))
-    if not touched(points, settings.drift_un_sqrt_s):
-        peak = float(np.max(points.force_un - free_force_un(points)))
+    return points.but(_alone(points))
+
+
+def _fitted(
+    span: Span, points: Points, model: _Model | None, settings: FitSettings, place_um: float
+) -> SpanFit:
+    """Return the fit of one span; without a model it was not touched."""
+    if model is None:
+        peak = float(np.max(points.force_un - points.free_force_un))
         return _without_contact(span, place_um, peak)
-    rub = settings.friction if friction is None else friction
-    model = _Model(points, settings, span.shape or straight(place_um), rub)
     found = model.fit()
     fit = _span_result(span, points, model, found, place_um)
     flags = _flags(span, fit, points, settings, model, found.values)
@@ -456,22 +530,28 @@ def _kinds_of_yielding(
     travel, k = points.probe_um[out], math.exp(min(values[0], HIGHEST_LOG))
     freedom = max(len(out) - base.shape[1] - 2, 1)
 
-    def explained(*extra: Floats) -> tuple[float, float]:
-        matrix = np.column_stack([base, *extra]) * weight[:, None]
-        found = np.linalg.lstsq(matrix, left * weight, rcond=None)[0]
-        rest = left * weight - matrix @ found
-        return float(rest @ rest) / freedom, float(found[-1])
+    weighed, left = base * weight[:, None], left * weight
+    known, sizes, _ = np.linalg.svd(weighed, full_matrices=False)
+    known = known[:, sizes > sizes[0] * np.finfo(float).eps * len(out)]
+    left = left - known @ (known.T @ left)
+    plain = float(left @ left) / freedom
 
-    plain = explained()[0]
-    slip, slowly = (plain, 0.0), plain
-    for begin in range(1, len(out) - 1):
-        if travel[begin] <= values[1]:
-            continue
-        step = -k * (np.arange(len(out)) >= begin).astype(float)
-        chi2, size_um = explained(step)
-        if size_um > 0.0 and chi2 < slip[0]:
-            slip = chi2, size_um
-        chi2, part = explained(-k * np.maximum(travel - travel[begin], 0.0))
-        if part > 0.0:
-            slowly = min(slowly, chi2)
-    return slip, slowly, plain
+    def explained(more: Floats) -> tuple[float, float]:
+        """Return what the best of several columns leaves, and how much of it is needed."""
+        columns = more * weight[:, None]
+        whole = (columns * columns).sum(axis=0)
+        columns = columns - known @ (known.T @ columns)
+        own = (columns * columns).sum(axis=0)
+        new = own > ALIKE_PART * whole
+        size = np.divide(left @ columns, own, out=np.zeros(len(own)), where=new)
+        chi2 = np.where(size > 0.0, plain - size**2 * own / freedom, plain)
+        best = int(np.argmin(chi2))
+        return float(chi2[best]), float(max(size[best], 0.0))
+
+    begins = np.arange(1, len(out) - 1)
+    begins = begins[travel[begins] > values[1]]
+    if not len(begins):
+        return (plain, 0.0), plain, plain
+    at_once = -k * (np.arange(len(out))[:, None] >= begins).astype(float)
+    slowly = -k * np.maximum(travel[:, None] - travel[begins], 0.0)
+    return explained(at_once), explained(slowly)[0], plain

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from cosmic.autonomy.bending.curved import NaturalShape
+from cosmic.autonomy.bending.curved import NaturalShape, curves_of
 from cosmic.autonomy.bending.fit import fit_bending
+from cosmic.autonomy.bending.response import response_of
 from cosmic.autonomy.bending.result import BendingError
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
@@ -53,6 +54,29 @@ def test_the_curve_of_a_curled_fibre_agrees_with_a_chain_of_least_energy(
         links=100,
     )
     assert force == pytest.approx(chain, rel=5e-3)
+
+
+def test_fibres_laid_out_together_bend_as_each_by_itself() -> None:
+    shapes = [shape_at(turn_deg, 450.0) for turn_deg in (-60.0, 0.0, 25.0)]
+    bent = {"depth_um": 20.0, "radius_um": 25.0, "friction": 0.3}
+    together = curves_of([(each, (0.1 * EI, 0.0)) for each in shapes], **bent)
+    for shape, (giving, stiff) in zip(shapes, together, strict=True):
+        for curves, side_um_un in ((giving, 0.1), (stiff, 0.0)):
+            alone = shape.curves(**bent, ei_un_um2=EI, side_um_un=side_um_un)
+            for one, other in zip(curves, alone, strict=True):
+                np.testing.assert_allclose(one.deflection, other.deflection, rtol=1e-8)
+                np.testing.assert_allclose(one.pushed, other.pushed, rtol=1e-8)
+
+
+def test_what_spans_answer_is_kept_until_it_is_asked_for_other_depths() -> None:
+    response = response_of([shape_at(20.0, at_um) for at_um in SPANS_UM], depth_um=20.0)
+    depths = np.array([5.0, 20.0, 60.0])
+    first = response.laid_out(depths, 150.0, 0, every=1)
+    assert response.laid_out(depths.copy(), 150.0, 0, every=1) is first
+    other = response.laid_out(2.0 * depths, 150.0, 0, every=1)
+    np.testing.assert_array_equal(other.log_stiffness, response.log_stiffness(2.0 * depths))
+    np.testing.assert_array_equal(other.variation[1], response.variation(40.0, 150.0, 0))
+    assert response.laid_out(depths, 150.0, 0, every=1) is not first
 
 
 def spans(turn_deg: float, *, seed: int = 1) -> list[Span]:
