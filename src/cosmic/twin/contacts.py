@@ -65,6 +65,7 @@ class Contacts:
         self._stages = sorted({name for slide in self._slides for name, _ in slide.directions})
         self._origins = np.array([slide.origin for slide in self._slides])
         self._travels = np.array([self._travel_of(slide) for slide in self._slides])
+        self._all_travels = self._travels.reshape(-1, len(self._stages))
         self._steepest = float(np.abs(self._travels).max(initial=0.0))
         self._moving = [n for n, slide in enumerate(self._slides) if slide.directions]
         self._of_tool: dict[str, list[int]] = {}
@@ -76,16 +77,17 @@ class Contacts:
         self._lowest = self._origins + self._low + swept.min(axis=3).sum(axis=2)
         self._highest = self._origins + self._high + swept.max(axis=3).sum(axis=2)
         self._first, self._second = self._pairs()
+        self._top_um = self._highest_um()
         corner = math.sqrt(2.0) * PLATE_HALF_UM
         self._above_plate = [
             number
             for number in self._moving
             if (self._lowest[number, :2] < corner).all()
             and (self._highest[number, :2] > -corner).all()
-            and self._lowest[number, 2] < self._top_um()
+            and self._lowest[number, 2] < self._top_um
         ]
         self._looked_at = np.full_like(self._origins, math.inf)
-        self._placed_with: list[float] = []
+        self._placed_with: tuple[float, ...] = ()
         self._placed_s = self._nearer_um = 0.0
         self._slack_um = 0.0
         self._faces: dict[tuple[int, int], Faces] = {}
@@ -100,13 +102,14 @@ class Contacts:
             self._slack_um > near or (self._by_design is not None and time_s < self._next_s)
         ):
             return max(self._slack_um - near, FINEST_UM)
-        positions = self._origins + self._travels @ [values[name] for name in self._stages]
+        placed = tuple([values[name] for name in self._stages])
+        positions = self._origins + (self._all_travels @ placed).reshape(-1, 3)
         if not offsets.still:
             for tool, numbers in self._of_tool.items():
                 positions[numbers] += offsets.at(tool, time_s)
         gone = 2.0 * float(np.abs(positions - self._looked_at).max())
         bent = offsets.fastest_um_s is None
-        self._placed_with = [] if bent else [values[name] for name in self._stages]
+        self._placed_with = () if bent else placed
         self._placed_s, self._nearer_um = time_s, gone
         if self._slack_um > gone or (self._by_design is not None and time_s < self._next_s):
             return max(self._slack_um - gone, FINEST_UM)
@@ -138,7 +141,9 @@ class Contacts:
             return None
         gone = 0.0
         for name, before in zip(self._stages, self._placed_with, strict=True):
-            gone += abs(values[name] - before)
+            now = values[name]
+            if now != before:
+                gone += abs(now - before)
         since = self._steepest * gone + drifts_um_s * (time_s - self._placed_s)
         return self._nearer_um + 2.0 * since
 
@@ -234,7 +239,7 @@ class Contacts:
             self._faces[one, two] = faces[:, :3], -faces[:, 3]
         return self._faces[one, two]
 
-    def _top_um(self) -> float:
+    def _highest_um(self) -> float:
         """Return the height of the highest thing on the plate."""
         position = float(
             self._skeleton.pose(self._plate, dict.fromkeys(self._stage_names, 0.0))[2, 3]
@@ -249,11 +254,13 @@ class Contacts:
         low: Floats,
     ) -> None:
         """Add what stands in the plate or its clip: corners of one in the other."""
+        aboves = (low[self._above_plate, 2] - self._top_um).tolist()
+        nearest = min(aboves, default=math.inf)
+        self._slack_um = min(self._slack_um, nearest)
+        if nearest >= 0.0:
+            return
         plate = self._skeleton.pose(self._plate, values)
-        top = self._top_um()
-        for number in self._above_plate:
-            above = float(low[number, 2]) - top
-            self._slack_um = min(self._slack_um, above)
+        for number, above in zip(self._above_plate, aboves, strict=True):
             if above >= 0.0:
                 continue
             corners = (self._corners[number] + positions[number] - plate[:3, 3]) @ plate[:3, :3]
