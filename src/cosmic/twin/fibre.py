@@ -4,7 +4,7 @@ import math
 import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -94,8 +94,7 @@ class Carried:
     why: Why
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(NamedTuple):
     """The undeformed free part of a held fibre, as the probe meets it.
 
     Attributes
@@ -578,15 +577,15 @@ class _Curves:
         It is asked again and again at one travel, where the curves have one value each.
         """
         most = 1.0 if self.askew is None else self.askew.most
-        pairs = [
+        (down, up), *more = [
             (each[0].force_un(travel_um), each[-1].force_un(travel_um)) for each in self.curves
         ]
-
-        def force_un(held: float) -> float:
-            across = [held_un(down, up, held / most) for down, up in pairs]
-            return across[0] if len(across) == 1 else rubbed_un(across[0], across[1], part)
-
-        return force_un
+        if not more:
+            return lambda held: held_un(down, up, held / most)
+        falling_down, falling_up = more[0]
+        return lambda held: rubbed_un(
+            held_un(down, up, held / most), held_un(falling_down, falling_up, held / most), part
+        )
 
     def push(self, part: float, held: float) -> PushCurve | Push:
         """Return the push for friction along the fibre, -1 to 1, and a part of the force up."""

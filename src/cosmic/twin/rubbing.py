@@ -109,7 +109,9 @@ class Lifting:
         for _ in range(ROUNDS):
             now = force_un(part)
             up = held + askew.ratio * (now - before) + rose_um / askew.up_um_un
-            part = min(max(up / max(now, LEAST_UN), -askew.most), askew.most)
+            before_part, part = part, min(max(up / max(now, LEAST_UN), -askew.most), askew.most)
+            if part == before_part:
+                break
         self.part = part
         return part
 
@@ -147,7 +149,7 @@ def rubbed_un(growing_un: float, falling_un: float, part: float) -> float:
     return 0.5 * (growing_un + falling_un) + 0.5 * part * (growing_un - falling_un)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class HeldPush(Push):
     """A push with friction up or down: what it gives way follows between the two, evenly.
 
@@ -181,7 +183,7 @@ class HeldPush(Push):
         return across, across * along / one if one else 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class RubbedPush(Push):
     """A push between a growing and a falling one."""
 
