@@ -28,6 +28,8 @@ PROBE: Final = "probe"
 class Around:
     """Where everything is at one look; see `Surroundings`."""
 
+    __slots__ = ("_plate", "_values", "_workspace", "time_s", "tools")
+
     def __init__(
         self,
         workspace: "Workspace",
@@ -171,21 +173,26 @@ class Workspace:
         self._time_s = time_s
         tools = self._tools(values, time_s)
         around = Around(self, values, tools, time_s)
-        self._gripper_contacts.look(around)
-        self._gaps = {name: tool.gap_um for name, tool in tools.items()}
+        grippers = self._gripper_contacts
+        grippers.look(around)
         probe = added(self._probe.at(values), self.offsets.at(PROBE, time_s))
-        self._slack_um = self._gripper_contacts.slack_um
-        pushes = tuple(
-            push
-            for fibre in self._gripper_contacts.held
-            if (push := self._push(fibre, tools, probe, around)) is not None
-        )
+        self._slack_um = grippers.slack_um
+        pushes: tuple[Push, ...] = ()
+        for fibre in grippers.held:
+            push = self._push(fibre, tools, probe, around)
+            if push is not None:
+                pushes += (push,)
         if self._contacts is not None:
             self._nothing_before(self._contacts.look(values, time_s, self.offsets))
-        on_jaws = {name: self._jaw(name, tool, probe) for name, tool in tools.items()}
-        self._note(pushes, on_jaws)
-        jaw_un = sum(on_jaws.values())
-        return Felt(pushes, jaw_un, self._slack_um, self._gripper_contacts.gap_um)
+        on_jaws: dict[str, float] = {}
+        for name, tool in tools.items():
+            self._gaps[name] = tool.gap_um
+            force = self._jaw(name, tool, probe)
+            if force:
+                on_jaws[name] = force
+        if pushes or on_jaws or self._peaks_un:
+            self._note(pushes, on_jaws)
+        return Felt(pushes, sum(on_jaws.values(), 0.0), self._slack_um, grippers.gap_um)
 
     def change_plate(
         self, values: Mapping[str, float], number: int, fibres: tuple[FibreSettings, ...]
@@ -235,11 +242,13 @@ class Workspace:
 
     def _nothing_before(self, slack_um: float) -> None:
         """Take note that something may happen after so much way."""
-        self._slack_um = min(self._slack_um, max(slack_um, 0.0))
+        if slack_um < self._slack_um:
+            self._slack_um = max(slack_um, 0.0)
 
     def _tools(self, values: Mapping[str, float], time_s: float) -> dict[str, Tool]:
+        at, before = self.offsets.at, self._gaps.get
         return {
-            name: each.tool(name, values, self.offsets.at(name, time_s), self._gaps.get(name))
+            name: each.tool(name, values, at(name, time_s), before(name))
             for name, each in self._grippers.items()
         }
 
@@ -315,10 +324,8 @@ class Workspace:
 
     def _note(self, pushes: tuple[Push, ...], on_jaws: Mapping[str, float]) -> None:
         """Tell when the probe comes to a fibre or a jaw, and the highest force once it has left."""
-        if not (pushes or self._peaks_un or any(on_jaws.values())):
-            return
         forces: dict[int | str, float] = {push.fibre: push.force_un for push in pushes}
-        forces |= {name: force for name, force in on_jaws.items() if force}
+        forces |= on_jaws
         along = {push.fibre: push.abscissa_um for push in pushes}
         for what, force in forces.items():
             if what not in self._peaks_un:
@@ -341,8 +348,10 @@ class Workspace:
     @property
     def restless_s(self) -> float:
         """For how long nothing changes that the probe feels, though all stages stand."""
-        held = self._gripper_contacts.held
-        return min((each.restless_s for each in held), default=math.inf)
+        restless_s = math.inf
+        for each in self._gripper_contacts.held:
+            restless_s = min(restless_s, each.restless_s)
+        return restless_s
 
     def _jaw(self, name: str, tool: Tool, probe: Point) -> float:
         """Return the force of a jaw's outer face on the probe's tip."""
