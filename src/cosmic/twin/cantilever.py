@@ -40,6 +40,7 @@ HARDEST_UN: Final = 1500.0
 SHORTEST_UM: Final = 4.0
 ROUNDS: Final = 7
 NUDGE_RAD: Final = 1e-5
+SHORTEST_STEP_RAD: Final = 1e-9
 MET_RAD: Final = 1e-7
 BEYOND: Final = 1.9
 """So much longer the fibre is laid out, straight on, so that its end is found between places."""
@@ -192,12 +193,18 @@ class Cantilever:
         if self._stiffness is not None:
             bends = bends / self._stiffness(np.maximum(0.5 * (nodes[:-1] + nodes[1:]), 0.0))
         turn = -0.5 * loads[:, None] * np.ones_like(places)
+        open_ = np.arange(turn.size)
         for _ in range(ROUNDS):
-            both = np.stack([turn, turn + NUDGE_RAD])
-            missed, *_ = self._back(both, normal, heading, chords, bends)
+            row, place = np.divmod(open_, len(places))
+            at = row, place
+            both = np.stack([turn[at], turn[at] + NUDGE_RAD])
+            there = chords[0][:, place], chords[1][:, place]
+            missed, *_ = self._back(both, normal[at], heading[place], there, bends[:, place])
             slope = (missed[1] - missed[0]) / NUDGE_RAD
             step = missed[0] / np.where(np.abs(slope) > 1e-3, slope, 1.0)
-            turn = turn - np.clip(step, -0.5, 0.5)
+            turn[at] -= np.clip(step, -0.5, 0.5)
+            # Where a step is this short the next would be nothing but rounding.
+            open_ = open_[np.abs(step) > SHORTEST_STEP_RAD]
         missed, px, py, felt = self._back(turn[None], normal, heading, chords, bends)
         theta = heading + turn
         along = -normal * (np.sin(theta) + self._friction * np.cos(theta))

@@ -5,7 +5,7 @@ pair the set of positions where they overlap is a polytope that is computed once
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -68,9 +68,10 @@ class Contacts:
         self._all_travels = self._travels.reshape(-1, len(self._stages))
         self._steepest = float(np.abs(self._travels).max(initial=0.0))
         self._moving = [n for n, slide in enumerate(self._slides) if slide.directions]
-        self._of_tool: dict[str, list[int]] = {}
-        for number in self._moving:
-            self._of_tool.setdefault(self._links[number].partition("_")[0], []).append(number)
+        # What does not move is of no tool, the first.
+        names = [each.partition("_")[0] if s.directions else "" for each, s in self._bodies()]
+        self._tools = ("", *sorted(set(names) - {""}))
+        self._tool_of = np.array([self._tools.index(name) for name in names])
         travels = [settings.kinds[settings.stages[name].kind] for name in self._stages]
         ends = np.array([[kind.low, kind.high] for kind in travels])
         swept = self._travels[:, :, :, None] * ends[None, None, :, :]
@@ -105,9 +106,9 @@ class Contacts:
         placed = tuple([values[name] for name in self._stages])
         positions = self._origins + (self._all_travels @ placed).reshape(-1, 3)
         if not offsets.still:
-            for tool, numbers in self._of_tool.items():
-                positions[numbers] += offsets.at(tool, time_s)
-        gone = 2.0 * float(np.abs(positions - self._looked_at).max())
+            shifts = [offsets.at(tool, time_s) for tool in self._tools]
+            positions += np.array(shifts)[self._tool_of]
+        gone = 2.0 * float(np.maximum.reduce(np.abs(positions - self._looked_at), axis=None))
         bent = offsets.fastest_um_s is None
         self._placed_with = () if bent else placed
         self._placed_s, self._nearer_um = time_s, gone
@@ -176,6 +177,9 @@ class Contacts:
                 self._slides += [slide] * len(parts)
                 self._corners += [part @ turn.T for part in parts]
 
+    def _bodies(self) -> Iterator[tuple[str, Slide]]:
+        return zip(self._links, self._slides, strict=True)
+
     def _pairs(self) -> tuple[Numbers, Numbers]:
         """Return the numbers of bodies that could ever meet: their travels overlap."""
         found = [
@@ -211,13 +215,17 @@ class Contacts:
     ) -> dict[tuple[str, str], float]:
         low, high = self._low + positions, self._high + positions
         first, second = self._first, self._second
-        apart = np.maximum(low[first] - high[second], low[second] - high[first]).max(axis=1)
-        self._slack_um = float(apart.min(initial=math.inf))
+        gaps = np.maximum(low[first] - high[second], low[second] - high[first])
+        aparts = np.maximum.reduce(gaps, axis=1).tolist()
+        self._slack_um = min(aparts, default=math.inf)
         found: dict[tuple[str, str], float] = {}
-        for pair in np.flatnonzero(apart < 0.0).tolist():
+        for pair, apart in enumerate(aparts):
+            if apart >= 0.0:
+                continue
             one, two = int(first[pair]), int(second[pair])
             normals, reach = self._overlap(one, two)
-            depth = float((reach - normals @ (positions[two] - positions[one])).min())
+            depths = reach - normals @ (positions[two] - positions[one])
+            depth = float(np.minimum.reduce(depths))
             self._keep(found, (self._links[one], self._links[two]), depth)
         self._on_plate(found, values, positions, low)
         return found
@@ -265,6 +273,6 @@ class Contacts:
                 continue
             corners = (self._corners[number] + positions[number] - plate[:3, 3]) @ plate[:3, :3]
             for box in self._boxes:
-                inside = np.minimum(corners - box[0], box[1] - corners).min(axis=1)
-                depth = float(inside.max())
+                inside = np.minimum(corners - box[0], box[1] - corners)
+                depth = float(np.maximum.reduce(np.minimum.reduce(inside, axis=1)))
                 self._keep(found, (self._plate, self._links[number]), depth)

@@ -107,7 +107,7 @@ class ForceSensor:
             return np.empty(0)
         with self._lock:
             steps_s = self._steps_s(times_s)
-            force = np.zeros_like(times_s) if self._force_un is None else self._force_un(times_s)
+            force = None if self._force_un is None else self._force_un(times_s)
             felt = self._filtered(steps_s, force)
             felt += self._wandered(steps_s)
             self._time_s = max(self._time_s, float(times_s[-1]))
@@ -125,8 +125,10 @@ class ForceSensor:
             felt += self._zero_un_k * warmer_k
             if self._warm_up_un:
                 felt += self._warm_up_un * np.exp(-times_s / self.settings.warm_up_s)
-        out = self.true_zero_v + gain * felt
-        return out.clip(self.settings.zero_v - half_v, self.settings.zero_v + half_v)
+        felt *= gain
+        felt += self.true_zero_v
+        np.maximum(felt, self.settings.zero_v - half_v, out=felt)
+        return np.minimum(felt, self.settings.zero_v + half_v, out=felt)
 
     def _steps_s(self, times_s: Floats) -> Floats:
         """Return how much time passed before each sample; for ever before the very first."""
@@ -134,22 +136,24 @@ class ForceSensor:
         np.subtract(times_s[1:], times_s[:-1], out=steps_s[1:])
         steps_s[0] = max(float(times_s[0]) - self._time_s, 0.0)
         # Written so that NaN is caught; an infinite time leaves one too.
-        if not (steps_s.min() >= 0.0 and math.isfinite(float(times_s[-1]))):
+        if not (np.minimum.reduce(steps_s) >= 0.0 and math.isfinite(float(times_s[-1]))):
             raise ValueError(f"sensor {self.name}: the times of samples must rise")
         return steps_s
 
-    def _filtered(self, steps_s: Floats, force_un: Floats) -> Floats:
+    def _filtered(self, steps_s: Floats, force_un: Floats | None) -> Floats:
         """Pass force and white noise through the one pole of the amplifier.
 
         x[k] = r[k] x[k-1] + (1 - r[k]) force[k] + sqrt(1 - r[k]^2) noise[k], r = exp(-step/tau)
         """
         per_s = 2.0 * math.pi * self.settings.bandwidth_hz
-        decay = np.minimum(steps_s * per_s, LONGEST_RUN)
+        decay = steps_s * per_s
+        np.minimum(decay, LONGEST_RUN, out=decay)
         kept = np.exp(-decay)
-        drive = self._noise.standard_normal(force_un.size)
+        drive = self._noise.standard_normal(decay.size)
         drive *= self.settings.noise_un
         drive *= np.sqrt(1.0 - kept * kept)
-        drive += (1.0 - kept) * force_un
+        if force_un is not None:
+            drive += (1.0 - kept) * force_un
         return self._recur(decay, drive)
 
     def _recur(self, decay: Floats, drive: Floats) -> Floats:

@@ -169,10 +169,11 @@ class GripperContacts:
         self._thickest = max((each.settings.width_um for each in fibres), default=0.0)
         self.gap_um = self.slack_um = 0.0
         self.held: tuple[Fibre, ...] = ()
-        self._begun = False
+        self._begun = self._settled = False
 
     def plate_changed(self, begin: int) -> None:
         """Take note that the fibres from number `begin` on lie on a new plate."""
+        self._settled = False
         widths = [each.settings.width_um for each in self.fibres[begin:]]
         self._narrowest = min(widths, default=0.0)
         self._thickest = max(widths, default=0.0)
@@ -184,9 +185,7 @@ class GripperContacts:
             self._begun = True
             self._begin(around)
         self.slack_um = CARRYING_UM if self._clinging else math.inf
-        self.gap_um = math.inf
-        for name, tool in around.tools.items():
-            self._watch(name, tool, around)
+        self._watch_all(around)
         if self._in_hand:
             for name, fibre in list(self._in_hand.items()):
                 if len(fibre.holds) == 1:
@@ -195,6 +194,17 @@ class GripperContacts:
             for number in list(self._clinging):
                 self._shake(number, around)
         self.held = tuple(dict.fromkeys(self._in_hand.values())) if self._in_hand else ()
+
+    def _watch_all(self, around: Surroundings) -> None:
+        """Watch all jaws, unless they stand as they stood, with what they had."""
+        tools = around.tools
+        stand = all(each.gap_um == each.before_um for each in tools.values())
+        if stand and self._settled:
+            return
+        self._settled = stand
+        self.gap_um = math.inf
+        for name, tool in tools.items():
+            self._watch(name, tool, around)
 
     def _watch(self, name: str, tool: Tool, around: Surroundings) -> None:
         """Take, keep or let go with one gripper, as its gap changes."""
@@ -341,6 +351,7 @@ class GripperContacts:
     def _open(self, fibre: Fibre, tool: Tool, around: Surroundings) -> None:
         """Open the jaws around a fibre: the other gripper keeps it, or it falls, or it sticks."""
         name = tool.name
+        self._settled = False
         self._widest[name] = tool.gap_um
         if len(fibre.holds) > 1:
             del self._in_hand[name], fibre.holds[name]
@@ -365,6 +376,7 @@ class GripperContacts:
         self._clinging[fibre.number] = Clinging(self._handling, key, around.anchor(anchor))
 
     def _lose(self, fibre: Fibre, tool: Tool, around: Surroundings, event: str) -> None:
+        self._settled = False
         self._record(
             event, fibre=fibre.number, tool=tool.name, height_um=max(fibre.height_um(tool), 0.0)
         )

@@ -16,6 +16,7 @@ CELLS: Final = 16
 TIMES_S: Final = np.array([0.03, 0.3, 3.0, 30.0, 300.0])
 """One for each decade; what is slower does not show in a measurement."""
 
+ALL_TIMES: Final = np.ones(len(TIMES_S))
 FADING_PER_S: Final = -1.0 / TIMES_S[:, None]
 
 FULLEST: Final = 1.45
@@ -62,7 +63,7 @@ class Inelastic:
     def offset_um(self, arm_um: float) -> float:
         """Return how far the fibre stands back, at so far from the clamp."""
         levers = self._levers_um(arm_um)
-        crept = self._slope * float(self._creeping.dot(levers).sum())
+        crept = self._slope * float(ALL_TIMES.dot(self._creeping.dot(levers)))
         return self._cell_um * (crept + float(self._set.dot(levers)) if self._has_set else crept)
 
     def follow(self, time_s: float, force_un: float, arm_um: float, ei_un_um2: float) -> None:

@@ -78,18 +78,10 @@ class PushCurve:
     def both_un(self, travel_um: float) -> tuple[float, float]:
         """Return the force across and the force along, as a look needs both."""
         asked_um, found = self._asked
-        if travel_um != asked_um:  # a look asks several times for one travel
-            found = self._at(travel_um)
-            self._asked = travel_um, found
-        return found
-
-    def _at(self, travel_um: float) -> tuple[float, float]:
-        travels, forces, alongs, pushed_um = (
-            self.travels_um,
-            self.forces_un,
-            self.alongs_un,
-            abs(travel_um),
-        )
+        if travel_um == asked_um:  # a look asks several times for one travel
+            return found
+        travels, forces, alongs = self.travels_um, self.forces_un, self.alongs_un
+        pushed_um = abs(travel_um)
         if pushed_um >= self.reach_um:
             force, along = forces[-1], alongs[-1] if alongs else 0.0
         else:
@@ -99,7 +91,9 @@ class PushCurve:
             part = (pushed_um - travels[low]) / (travels[after] - travels[low])
             force = forces[low] + part * (forces[after] - forces[low])
             along = alongs[low] + part * (alongs[after] - alongs[low]) if alongs else 0.0
-        return (force, along) if travel_um >= 0.0 else (-force, -along)
+        found = (force, along) if travel_um >= 0.0 else (-force, -along)
+        self._asked = travel_um, found
+        return found
 
 
 @lru_cache(maxsize=128)

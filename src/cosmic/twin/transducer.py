@@ -29,7 +29,7 @@ class Transducer:
     """
 
     def __init__(self, settings: ForceSensorSettings, chance: np.random.Generator) -> None:
-        self._settings = settings
+        self._bend_per_un = settings.linearity / settings.range_un
         self.cross_part = settings.cross_talk * float(chance.standard_normal())
         self.axial_part = settings.axial_talk * float(chance.standard_normal())
         self._lag_part = settings.hysteresis / (2.0 * PLAY_PART)
@@ -43,11 +43,11 @@ class Transducer:
         if self.cross_part or self.axial_part:
             for push in felt.pushes:
                 signal += self.cross_part * push.along_un + self.axial_part * push.up_un
-        if self._settings.linearity:
-            signal *= 1.0 + self._settings.linearity * abs(force) / self._settings.range_un
+        signal *= 1.0 + self._bend_per_un * abs(force)
         if self._lag_part:
             low, high = force - self._play_un, force + self._play_un
-            self._lagging_un = min(max(self._lagging_un, low), high)
+            lagging = self._lagging_un
+            self._lagging_un = low if lagging < low else min(lagging, high)
             signal += self._lag_part * (self._lagging_un - force)
         return signal
 

@@ -266,14 +266,18 @@ class Workspace:
     def _push(
         self, fibre: Fibre, tools: dict[str, Tool], probe: Point, around: Around
     ) -> Push | None:
-        if len(fibre.holds) == 2:
-            fibre.slip(fibre.line(tools).reach_um)
         line = fibre.line(tools)
-        touch = self._touches.setdefault(fibre.number, Touch())
+        if line.free is None:
+            fibre.slip(line.reach_um)
+            line = fibre.line(tools)
+        touch = self._touches.get(fibre.number)
+        if touch is None:
+            touch = self._touches[fibre.number] = Touch()
         along = line.abscissa_um(probe[0] + self._geometry.probe_contact_um)
         back = fibre.back_um(along)
         travel = line.y_um(along) + fibre.seen_um / 2.0 - probe[1] - back
-        reach = self._reach(fibre, line, along, probe[2])
+        higher = line.z_um(along) - probe[2]
+        reach = self._reach(fibre, line, along, higher)
         jump = fibre.jump_um(along, self._time_s) if line.free is not None else 0.0
         if not touch.look(reach, travel + jump):
             self._nothing_before(max(-reach, -travel - jump))
@@ -287,7 +291,7 @@ class Workspace:
             self._probe_shape,
             self._time_s,
             back_um=back,
-            height_um=line.z_um(along) - probe[2],
+            height_um=higher,
         )
         force, along_un = curve.both_un(travel)
         if travel > curve.reach_um:
@@ -317,10 +321,9 @@ class Workspace:
             return False
         return True
 
-    def _reach(self, fibre: Fibre, line: Line, along_um: float, probe_z_um: float) -> float:
+    def _reach(self, fibre: Fibre, line: Line, along_um: float, higher_um: float) -> float:
         thick = self._geometry.probe_half_width_um + fibre.settings.thickness_um / 2.0
-        off = abs(probe_z_um - line.z_um(along_um))
-        return min(along_um, line.reach_um - along_um, thick - off)
+        return min(along_um, line.reach_um - along_um, thick - abs(higher_um))
 
     def _note(self, pushes: tuple[Push, ...], on_jaws: Mapping[str, float]) -> None:
         """Tell when the probe comes to a fibre or a jaw, and the highest force once it has left."""
