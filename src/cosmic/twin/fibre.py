@@ -34,8 +34,7 @@ from cosmic.twin.rubbing import (
     Push,
     RubbedPush,
     Rubbing,
-    held_un,
-    rubbed_un,
+    given_um_un,
 )
 from cosmic.twin.section import Section
 from cosmic.twin.tools import Tool
@@ -571,17 +570,13 @@ class _Curves:
         It is asked again and again at one travel, where the curves have one value each.
         """
         most = 1.0 if self.askew is None else self.askew.most
-        growing, falling = self.curves[0], self.curves[-1]
-        down, up = growing[0].force_un(travel_um), growing[-1].force_un(travel_um)
-        if falling is growing:
-            return lambda held: held_un(down, up, held / most)
-        down_off, up_off = falling[0].force_un(travel_um), falling[-1].force_un(travel_um)
-
-        def force_un(held: float) -> float:
-            on, off = held_un(down, up, held / most), held_un(down_off, up_off, held / most)
-            return rubbed_un(on, off, part)
-
-        return force_un
+        (one, per_one), (other, per_other) = [
+            given_um_un(each[0].force_un(travel_um), each[-1].force_un(travel_um))
+            for each in (self.curves[0], self.curves[-1])
+        ]
+        per_one, per_other = per_one / most, per_other / most
+        grows, falls = 0.5 + 0.5 * part, 0.5 - 0.5 * part
+        return lambda held: grows / (one + per_one * held) + falls / (other + per_other * held)
 
     def push(self, part: float, held: float) -> PushCurve | Push:
         """Return the push for friction along the fibre, -1 to 1, and a part of the force up."""
