@@ -328,7 +328,7 @@ class Workspace:
     def _note(self, pushes: tuple[Push, ...], on_jaws: Mapping[str, float]) -> None:
         """Tell when the probe comes to a fibre or a jaw, and the highest force once it has left."""
         forces: dict[int | str, float] = {push.fibre: push.force_un for push in pushes}
-        forces |= on_jaws
+        forces.update(on_jaws.items())
         along = {push.fibre: push.abscissa_um for push in pushes}
         for what, force in forces.items():
             if what not in self._peaks_un:
