@@ -6,6 +6,7 @@ pair the set of positions where they overlap is a polytope that is computed once
 
 import math
 from collections.abc import Iterator, Mapping
+from operator import sub
 from pathlib import Path
 from typing import Final
 
@@ -140,11 +141,8 @@ class Contacts:
         drifts_um_s = offsets.fastest_um_s
         if drifts_um_s is None or not self._placed_with:
             return None
-        gone = 0.0
-        for name, before in zip(self._stages, self._placed_with, strict=True):
-            now = values[name]
-            if now != before:
-                gone += abs(now - before)
+        placed = [values[name] for name in self._stages]
+        gone: float = sum(map(abs, map(sub, placed, self._placed_with)))
         since = self._steepest * gone + drifts_um_s * (time_s - self._placed_s)
         return self._nearer_um + 2.0 * since
 

@@ -110,9 +110,8 @@ class ForceSensor:
         if not times_s.size:
             return np.empty(0)
         with self._lock:
-            steps_s = self._steps_s(times_s)
+            pace = self._paced(times_s)
             force = None if self._force_un is None else self._force_un(times_s)
-            pace = self._paced(steps_s)
             felt = self._filtered(pace, force)
             felt += self._wandered(pace)
             self._time_s = max(self._time_s, float(times_s[-1]))
@@ -135,21 +134,19 @@ class ForceSensor:
         np.maximum(felt, self.settings.zero_v - half_v, out=felt)
         return np.minimum(felt, self.settings.zero_v + half_v, out=felt)
 
-    def _steps_s(self, times_s: Floats) -> Floats:
-        """Return how much time passed before each sample; for ever before the very first."""
+    def _paced(self, times_s: Floats) -> "_Pace":
+        """Return what depends on the times alone; the chunks of a board share it."""
         steps_s = np.empty_like(times_s)
         np.subtract(times_s[1:], times_s[:-1], out=steps_s[1:])
+        # For ever before the very first.
         steps_s[0] = max(float(times_s[0]) - self._time_s, 0.0)
+        pace = self._pace
+        if pace is not None and pace.fits(steps_s):
+            return pace
         # Written so that NaN is caught; an infinite time leaves one too.
         if not (np.minimum.reduce(steps_s) >= 0.0 and math.isfinite(float(times_s[-1]))):
             raise ValueError(f"sensor {self.name}: the times of samples must rise")
-        return steps_s
-
-    def _paced(self, steps_s: Floats) -> "_Pace":
-        """Return what depends on the times alone; the chunks of a board share it."""
-        pace = self._pace
-        if pace is None or not pace.fits(steps_s):
-            pace = self._pace = _Pace(steps_s, 2.0 * math.pi * self.settings.bandwidth_hz)
+        pace = self._pace = _Pace(steps_s, 2.0 * math.pi * self.settings.bandwidth_hz)
         return pace
 
     def _filtered(self, pace: "_Pace", force_un: Floats | None) -> Floats:
@@ -168,7 +165,7 @@ class ForceSensor:
             first = pace.kept[start] * self._state_un + float(run[0])
             run *= growth
             run[0] = first
-            np.cumsum(run, out=run)
+            np.add.accumulate(run, out=run)
             run /= growth
             self._state_un = float(run[-1])
         return drive
@@ -179,7 +176,7 @@ class ForceSensor:
         steps *= self._drift.standard_normal(steps.size)
         if self.running_un_s:
             steps += self.running_un_s * pace.lasted_s
-        walk = steps.cumsum()
+        walk = np.add.accumulate(steps)
         walk += self._walk_un
         self._walk_un = float(walk[-1])
         return walk

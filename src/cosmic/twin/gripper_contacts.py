@@ -171,6 +171,11 @@ class GripperContacts:
         self.held: tuple[Fibre, ...] = ()
         self._begun = self._settled = False
 
+    @property
+    def idle(self) -> bool:
+        """Whether nothing can happen as long as no jaws open or close."""
+        return self._settled and not (self._in_hand or self._clinging)
+
     def plate_changed(self, begin: int) -> None:
         """Take note that the fibres from number `begin` on lie on a new plate."""
         self._settled = False
@@ -198,10 +203,13 @@ class GripperContacts:
     def _watch_all(self, around: Surroundings) -> None:
         """Watch all jaws, unless they stand as they stood, with what they had."""
         tools = around.tools
-        stand = all(each.gap_um == each.before_um for each in tools.values())
-        if stand and self._settled:
-            return
-        self._settled = stand
+        if self._settled:
+            for tool in tools.values():
+                if tool.gap_um != tool.before_um:
+                    break
+            else:
+                return
+        self._settled = all(each.gap_um == each.before_um for each in tools.values())
         self.gap_um = math.inf
         for name, tool in tools.items():
             self._watch(name, tool, around)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from cosmic.frame.errors import NotAvailable
+from cosmic.twin.clearance import Clearance
 from cosmic.twin.climate import Climate
 from cosmic.twin.contacts import PLATE_HALF_UM, Contacts
 from cosmic.twin.felt import Felt, Moment, Push
@@ -122,8 +123,12 @@ class Workspace:
         self._peaks_un: dict[int | str, float] = {}
         self._jaw_touches = {name: Touch() for name in self._grippers}
         self._gaps: dict[str, float] = {}
-        self._slack_um = 0.0
         self.gripper_stages = frozenset(each.stage for each in self._geometry.grippers.values())
+        self._jaw_stages = [(name, each.stage) for name, each in self._geometry.grippers.items()]
+        jaws = [slide for each in self._grippers.values() for slide in each.slides]
+        self._clear = Clearance([self._probe, *jaws], self.gripper_stages)
+        self._clear_after_um = self._jaws_clear_um = 0.0
+        self._slack_um = 0.0
         self._contacts: Contacts | None = None
         if folder is not None:
             self._contacts = Contacts(settings, folder, skeleton, self._record)
@@ -171,6 +176,38 @@ class Workspace:
     def look(self, values: Mapping[str, float], time_s: float) -> Felt:
         """Take everything to where the stages are now, and return what the probe feels."""
         self._time_s = time_s
+        slack_um = self._without_jaws_um(values, time_s)
+        if slack_um is not None and slack_um < self._clear_after_um:
+            self._clear.pass_by()
+            return Felt((), 0.0, slack_um, self._gripper_contacts.gap_um)
+        if self._clear.passed:
+            self._look_back()
+        return self._look_at_all(values, time_s, slack_um)
+
+    def _without_jaws_um(self, values: Mapping[str, float], time_s: float) -> float | None:
+        """Return the slack of all bodies where jaws need not be asked, else None."""
+        clear, drift_um_s = self._clear, self.offsets.fastest_um_s
+        if self._contacts is None or clear.left_um <= 0.0 or drift_um_s is None:
+            return None
+        for name, stage in self._jaw_stages:
+            if values[stage] != self._gaps[name]:
+                return None
+        self._clear_after_um = clear.after_um(values, time_s, drift_um_s)
+        if self._clear_after_um <= 0.0:
+            return None
+        return self._contacts.look(values, time_s, self.offsets)
+
+    def _look_back(self) -> None:
+        """Have the jaws see the last look, which left them out: they know where they came from."""
+        values, time_s = self._clear.before()
+        probe = added(self._probe.at(values), self.offsets.at(PROBE, time_s))
+        for name, tool in self._tools(values, time_s).items():
+            self._jaw(name, tool, probe)
+
+    def _look_at_all(
+        self, values: Mapping[str, float], time_s: float, bodies_um: float | None
+    ) -> Felt:
+        """Return what the probe feels; `bodies_um` as of this look, None: not asked for yet."""
         tools = self._tools(values, time_s)
         around = Around(self, values, tools, time_s)
         grippers = self._gripper_contacts
@@ -182,8 +219,11 @@ class Workspace:
             push = self._push(fibre, tools, probe, around)
             if push is not None:
                 pushes += (push,)
-        if self._contacts is not None:
-            self._nothing_before(self._contacts.look(values, time_s, self.offsets))
+        if bodies_um is None and self._contacts is not None:
+            bodies_um = self._contacts.look(values, time_s, self.offsets)
+        if bodies_um is not None:
+            self._nothing_before(bodies_um)
+        self._jaws_clear_um = math.inf
         on_jaws: dict[str, float] = {}
         for name, tool in tools.items():
             self._gaps[name] = tool.gap_um
@@ -192,6 +232,10 @@ class Workspace:
                 on_jaws[name] = force
         if pushes or on_jaws or self._peaks_un:
             self._note(pushes, on_jaws)
+        if grippers.idle and self._jaws_clear_um > self._slack_um:
+            self._clear.begin(values, time_s, self._jaws_clear_um)
+        else:
+            self._clear.end()
         return Felt(pushes, sum(on_jaws.values(), 0.0), self._slack_um, grippers.gap_um)
 
     def change_plate(
@@ -220,6 +264,7 @@ class Workspace:
             for place, each in enumerate(fibres)
         ]
         self._gripper_contacts.plate_changed(begin)
+        self._clear.left_um = 0.0
         record_plate(self._truth, self._time_s, number, begin, fibres)
 
     def check_plate_change(self, values: Mapping[str, float]) -> None:
@@ -372,9 +417,11 @@ class Workspace:
         travel = face - probe[1]
         touch = self._jaw_touches[name]
         if not touch.look(reach, travel):
-            self._nothing_before(max(-reach, -travel))
+            clear_um = max(-reach, -travel)
+            self._jaws_clear_um = min(self._jaws_clear_um, clear_um)
+            self._nothing_before(clear_um)
             return NOTHING
-        self._slack_um = 0.0
+        self._slack_um = self._jaws_clear_um = 0.0
         if travel < 0.0:
             touch.come_off()
             return NOTHING
