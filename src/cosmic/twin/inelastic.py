@@ -17,6 +17,9 @@ TIMES_S: Final = np.array([0.03, 0.3, 3.0, 30.0, 300.0])
 """One for each decade; what is slower does not show in a measurement."""
 
 ALL_TIMES: Final = np.ones(len(TIMES_S))
+SAME_TIME: Final = 1e-9
+"""Part by which times between looks differ that are the same but for rounding."""
+
 FADING_PER_S: Final = -1.0 / TIMES_S[:, None]
 
 FULLEST: Final = 1.45
@@ -58,7 +61,7 @@ class Inelastic:
         self._loaded_s = 0.0
         self._force_un = 0.0
         self._arm_um, self._levers = 0.0, np.zeros(CELLS)
-        self._kept = np.ones((len(TIMES_S), 1))
+        self._kept, self._kept_for_s = np.ones((len(TIMES_S), 1)), 0.0
 
     def offset_um(self, arm_um: float) -> float:
         """Return how far the fibre stands back, at so far from the clamp."""
@@ -70,7 +73,9 @@ class Inelastic:
         """Take note of the force there from now on; times rise."""
         passed_s, self._time_s = time_s - self._time_s, time_s
         creeping, kept = self._creeping, self._kept
-        np.exp(np.multiply(FADING_PER_S, passed_s, out=kept), out=kept)
+        if abs(passed_s - self._kept_for_s) > SAME_TIME * passed_s:
+            self._kept_for_s = passed_s
+            np.exp(np.multiply(FADING_PER_S, passed_s, out=kept), out=kept)
         creeping -= self._before
         creeping *= kept
         creeping += self._before
