@@ -4,10 +4,10 @@ import math
 import random
 
 import pytest
-from unit.twin.force_bench import FIBRE, Bench, Heard, settings
 
 from cosmic.twin.clearance import Clearance
 from cosmic.twin.kinematics import Slide
+from unit.twin.force_bench import FIBRE, Bench, Heard, settings
 
 PROBE = Slide((0.0, 900.0, 100.0), (("p.x", (1.0, 0.0, 0.0)), ("p.y", (0.0, 1.0, 0.0))))
 JAW = Slide((0.0, 0.0, 0.0), (("j.x", (0.0, 0.8, 0.6)), ("j.gripper", (0.0, -0.5, 0.0))))
