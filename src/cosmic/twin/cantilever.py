@@ -169,12 +169,16 @@ class Cantilever:
         logs = np.log(x)
         length = np.exp(wanted)
         out = (wanted < logs[0] - 0.2) | (wanted > logs[-1] + 1e-9)
-        values = [
-            _smooth(logs, pushed.y[number, run], wanted),
-            _smooth(logs, pushed.force[number, run] * x**2, wanted) / self._ei,
-            _smooth(logs, pushed.along[number, run] * x**2, wanted) / self._ei,
-            _smooth(logs, pushed.arcs[run] / x, wanted) * length,
-        ]
+        known = np.stack(
+            [
+                pushed.y[number, run],
+                pushed.force[number, run] * x**2,
+                pushed.along[number, run] * x**2,
+                pushed.arcs[run] / x,
+            ]
+        )
+        y, force, along, arc = _smooth(logs, known, wanted)
+        values = y, force / self._ei, along / self._ei, arc * length
         return tuple(np.where(out, math.nan, each) for each in values)
 
     def _shoot(self, places: Floats, loads: Floats) -> "_Pushed":
@@ -288,14 +292,14 @@ def _between(nodes: Floats, at: float) -> tuple[Floats, npt.NDArray[np.intp]]:
 
 
 def _smooth(nodes: Floats, values: Floats, wanted: Floats) -> Floats:
-    """Return values between nodes by a cubic through the four around each place."""
+    """Return rows of values between nodes by a cubic through the four around each place."""
     first = np.clip(np.searchsorted(nodes, wanted) - 2, 0, len(nodes) - 4)
     numbers = first + np.arange(4)[:, None]
-    x, found = nodes[numbers], np.zeros_like(wanted)
+    x, found = nodes[numbers], np.zeros((len(values), len(wanted)))
     for n in range(4):
         weight = np.ones_like(wanted)
         for k in range(4):
             if k != n:
                 weight = weight * (wanted - x[k]) / (x[n] - x[k])
-        found = found + weight * values[numbers[n]]
+        found += weight * values[:, numbers[n]]
     return found
