@@ -62,7 +62,7 @@ class _Table:
 
 
 class Cantilever:
-    """What a held fibre does to a probe; any thread, never changed.
+    """What a held fibre does to a probe; any thread.
 
     Parameters
     ----------
@@ -114,6 +114,8 @@ class Cantilever:
         self._y = np.concatenate([[0.0], asides_um, [asides_um[-1] + end[1]]])
         along = np.concatenate([[0.0], np.cumsum(steps)])
         self._s = np.concatenate([[-depth_um], along, [BEYOND * self._free_um]])
+        none = np.zeros(1)
+        self._asked: tuple[float, tuple[Floats, Floats, Floats]] = math.nan, (none, none, none)
 
     def curve(self, abscissa_um: float, *, sensor_un_um: float, stiffer: float = 1.0) -> PushCurve:
         """Return force over travel of a probe whose middle stands at an abscissa from the tip.
@@ -125,6 +127,16 @@ class Cantilever:
         stiffer : float
             So many times as stiff the fibre itself bends: something else holds it besides.
         """
+        asked_um, found = self._asked
+        if abscissa_um != asked_um:  # a fibre asks for one place several times
+            found = self._met(abscissa_um)
+            self._asked = abscissa_um, found
+        deflections, forces, alongs = found
+        deflections = deflections + (stiffer - 1.0) * forces / self._side
+        return PushCurve(deflections, stiffer * forces, sensor_un_um, stiffer * alongs)
+
+    def _met(self, abscissa_um: float) -> tuple[Floats, Floats, Floats]:
+        """Return deflections and forces, across and along, at a place, load by load."""
         table = self._table
         length = max(abscissa_um + self._depth, math.exp(table.log_lengths[0]))
         weights, columns = _between(table.log_lengths, math.log(length))
@@ -141,9 +153,7 @@ class Cantilever:
             last += 1
         last = max(last, 1)
         deflections[0] = forces[0] = alongs[0] = 0.0
-        deflections = deflections + (stiffer - 1.0) * forces / self._side
-        forces, alongs = stiffer * forces, stiffer * alongs
-        return PushCurve(deflections[:last], forces[:last], sensor_un_um, alongs[:last])
+        return deflections[:last], forces[:last], alongs[:last]
 
     @cached_property
     def _table(self) -> _Table:
