@@ -40,6 +40,7 @@ HARDEST_UN: Final = 1500.0
 SHORTEST_UM: Final = 4.0
 ROUNDS: Final = 7
 NUDGE_RAD: Final = 1e-5
+SHORTEST_STEP_RAD: Final = 1e-9
 MET_RAD: Final = 1e-7
 BEYOND: Final = 1.9
 """So much longer the fibre is laid out, straight on, so that its end is found between places."""
@@ -61,7 +62,7 @@ class _Table:
 
 
 class Cantilever:
-    """What a held fibre does to a probe; any thread, never changed.
+    """What a held fibre does to a probe; any thread.
 
     Parameters
     ----------
@@ -113,6 +114,8 @@ class Cantilever:
         self._y = np.concatenate([[0.0], asides_um, [asides_um[-1] + end[1]]])
         along = np.concatenate([[0.0], np.cumsum(steps)])
         self._s = np.concatenate([[-depth_um], along, [BEYOND * self._free_um]])
+        none = np.zeros(1)
+        self._asked: tuple[float, tuple[Floats, Floats, Floats]] = math.nan, (none, none, none)
 
     def curve(self, abscissa_um: float, *, sensor_un_um: float, stiffer: float = 1.0) -> PushCurve:
         """Return force over travel of a probe whose middle stands at an abscissa from the tip.
@@ -124,6 +127,16 @@ class Cantilever:
         stiffer : float
             So many times as stiff the fibre itself bends: something else holds it besides.
         """
+        asked_um, found = self._asked
+        if abscissa_um != asked_um:  # a fibre asks for one place several times
+            found = self._met(abscissa_um)
+            self._asked = abscissa_um, found
+        deflections, forces, alongs = found
+        deflections = deflections + (stiffer - 1.0) * forces / self._side
+        return PushCurve(deflections, stiffer * forces, sensor_un_um, stiffer * alongs)
+
+    def _met(self, abscissa_um: float) -> tuple[Floats, Floats, Floats]:
+        """Return deflections and forces, across and along, at a place, load by load."""
         table = self._table
         length = max(abscissa_um + self._depth, math.exp(table.log_lengths[0]))
         weights, columns = _between(table.log_lengths, math.log(length))
@@ -140,9 +153,7 @@ class Cantilever:
             last += 1
         last = max(last, 1)
         deflections[0] = forces[0] = alongs[0] = 0.0
-        deflections = deflections + (stiffer - 1.0) * forces / self._side
-        forces, alongs = stiffer * forces, stiffer * alongs
-        return PushCurve(deflections[:last], forces[:last], sensor_un_um, alongs[:last])
+        return deflections[:last], forces[:last], alongs[:last]
 
     @cached_property
     def _table(self) -> _Table:
@@ -168,12 +179,16 @@ class Cantilever:
         logs = np.log(x)
         length = np.exp(wanted)
         out = (wanted < logs[0] - 0.2) | (wanted > logs[-1] + 1e-9)
-        values = [
-            _smooth(logs, pushed.y[number, run], wanted),
-            _smooth(logs, pushed.force[number, run] * x**2, wanted) / self._ei,
-            _smooth(logs, pushed.along[number, run] * x**2, wanted) / self._ei,
-            _smooth(logs, pushed.arcs[run] / x, wanted) * length,
-        ]
+        known = np.stack(
+            [
+                pushed.y[number, run],
+                pushed.force[number, run] * x**2,
+                pushed.along[number, run] * x**2,
+                pushed.arcs[run] / x,
+            ]
+        )
+        y, force, along, arc = _smooth(logs, known, wanted)
+        values = y, force / self._ei, along / self._ei, arc * length
         return tuple(np.where(out, math.nan, each) for each in values)
 
     def _shoot(self, places: Floats, loads: Floats) -> "_Pushed":
@@ -192,12 +207,18 @@ class Cantilever:
         if self._stiffness is not None:
             bends = bends / self._stiffness(np.maximum(0.5 * (nodes[:-1] + nodes[1:]), 0.0))
         turn = -0.5 * loads[:, None] * np.ones_like(places)
+        open_ = np.arange(turn.size)
         for _ in range(ROUNDS):
-            both = np.stack([turn, turn + NUDGE_RAD])
-            missed, *_ = self._back(both, normal, heading, chords, bends)
+            row, place = np.divmod(open_, len(places))
+            at = row, place
+            both = np.stack([turn[at], turn[at] + NUDGE_RAD])
+            there = chords[0][:, place], chords[1][:, place]
+            missed, *_ = self._back(both, normal[at], heading[place], there, bends[:, place])
             slope = (missed[1] - missed[0]) / NUDGE_RAD
             step = missed[0] / np.where(np.abs(slope) > 1e-3, slope, 1.0)
-            turn = turn - np.clip(step, -0.5, 0.5)
+            turn[at] -= np.clip(step, -0.5, 0.5)
+            # Where a step is this short the next would be nothing but rounding.
+            open_ = open_[np.abs(step) > SHORTEST_STEP_RAD]
         missed, px, py, felt = self._back(turn[None], normal, heading, chords, bends)
         theta = heading + turn
         along = -normal * (np.sin(theta) + self._friction * np.cos(theta))
@@ -281,14 +302,14 @@ def _between(nodes: Floats, at: float) -> tuple[Floats, npt.NDArray[np.intp]]:
 
 
 def _smooth(nodes: Floats, values: Floats, wanted: Floats) -> Floats:
-    """Return values between nodes by a cubic through the four around each place."""
+    """Return rows of values between nodes by a cubic through the four around each place."""
     first = np.clip(np.searchsorted(nodes, wanted) - 2, 0, len(nodes) - 4)
     numbers = first + np.arange(4)[:, None]
-    x, found = nodes[numbers], np.zeros_like(wanted)
+    x, found = nodes[numbers], np.zeros((len(values), len(wanted)))
     for n in range(4):
         weight = np.ones_like(wanted)
         for k in range(4):
             if k != n:
                 weight = weight * (wanted - x[k]) / (x[n] - x[k])
-        found = found + weight * values[numbers[n]]
+        found += weight * values[:, numbers[n]]
     return found

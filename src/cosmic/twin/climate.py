@@ -33,12 +33,17 @@ class Climate:
         self._settings = settings
         chance = random.Random(f"climate {seed}")
         self._phases = chance.uniform(0.0, 2.0 * math.pi), chance.uniform(0.0, 2.0 * math.pi)
+        self._humid = math.nan, 0.0
 
     def rh_percent(self, time_s: float) -> float:
         """Return the relative humidity."""
-        each = self._settings
-        part = _wave(time_s, each.rh_period_s, self._phases[0])
-        return min(max(each.rh_percent + each.rh_wander_percent * part, 0.0), 98.0)
+        asked_s, found = self._humid
+        if time_s != asked_s:  # a look asks several times
+            each = self._settings
+            part = _wave(time_s, each.rh_period_s, self._phases[0])
+            found = min(max(each.rh_percent + each.rh_wander_percent * part, 0.0), 98.0)
+            self._humid = time_s, found
+        return found
 
     def warmer_k(self, time_s: float) -> float:
         """Return how much warmer it is than at the start."""

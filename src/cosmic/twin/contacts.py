@@ -5,7 +5,8 @@ pair the set of positions where they overlap is a polytope that is computed once
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from operator import sub
 from pathlib import Path
 from typing import Final
 
@@ -65,27 +66,30 @@ class Contacts:
         self._stages = sorted({name for slide in self._slides for name, _ in slide.directions})
         self._origins = np.array([slide.origin for slide in self._slides])
         self._travels = np.array([self._travel_of(slide) for slide in self._slides])
+        self._all_travels = self._travels.reshape(-1, len(self._stages))
         self._steepest = float(np.abs(self._travels).max(initial=0.0))
         self._moving = [n for n, slide in enumerate(self._slides) if slide.directions]
-        self._of_tool: dict[str, list[int]] = {}
-        for number in self._moving:
-            self._of_tool.setdefault(self._links[number].partition("_")[0], []).append(number)
+        # What does not move is of no tool, the first.
+        names = [each.partition("_")[0] if s.directions else "" for each, s in self._bodies()]
+        self._tools = ("", *sorted(set(names) - {""}))
+        self._tool_of = np.array([self._tools.index(name) for name in names])
         travels = [settings.kinds[settings.stages[name].kind] for name in self._stages]
         ends = np.array([[kind.low, kind.high] for kind in travels])
         swept = self._travels[:, :, :, None] * ends[None, None, :, :]
         self._lowest = self._origins + self._low + swept.min(axis=3).sum(axis=2)
         self._highest = self._origins + self._high + swept.max(axis=3).sum(axis=2)
         self._first, self._second = self._pairs()
+        self._top_um = self._highest_um()
         corner = math.sqrt(2.0) * PLATE_HALF_UM
         self._above_plate = [
             number
             for number in self._moving
             if (self._lowest[number, :2] < corner).all()
             and (self._highest[number, :2] > -corner).all()
-            and self._lowest[number, 2] < self._top_um()
+            and self._lowest[number, 2] < self._top_um
         ]
         self._looked_at = np.full_like(self._origins, math.inf)
-        self._placed_with: list[float] = []
+        self._placed_with: tuple[float, ...] = ()
         self._placed_s = self._nearer_um = 0.0
         self._slack_um = 0.0
         self._faces: dict[tuple[int, int], Faces] = {}
@@ -100,13 +104,14 @@ class Contacts:
             self._slack_um > near or (self._by_design is not None and time_s < self._next_s)
         ):
             return max(self._slack_um - near, FINEST_UM)
-        positions = self._origins + self._travels @ [values[name] for name in self._stages]
+        placed = tuple([values[name] for name in self._stages])
+        positions = self._origins + (self._all_travels @ placed).reshape(-1, 3)
         if not offsets.still:
-            for tool, numbers in self._of_tool.items():
-                positions[numbers] += offsets.at(tool, time_s)
-        gone = 2.0 * float(np.abs(positions - self._looked_at).max())
+            shifts = [offsets.at(tool, time_s) for tool in self._tools]
+            positions += np.array(shifts)[self._tool_of]
+        gone = 2.0 * float(np.maximum.reduce(np.abs(positions - self._looked_at), axis=None))
         bent = offsets.fastest_um_s is None
-        self._placed_with = [] if bent else [values[name] for name in self._stages]
+        self._placed_with = () if bent else placed
         self._placed_s, self._nearer_um = time_s, gone
         if self._slack_um > gone or (self._by_design is not None and time_s < self._next_s):
             return max(self._slack_um - gone, FINEST_UM)
@@ -136,9 +141,8 @@ class Contacts:
         drifts_um_s = offsets.fastest_um_s
         if drifts_um_s is None or not self._placed_with:
             return None
-        gone = 0.0
-        for name, before in zip(self._stages, self._placed_with, strict=True):
-            gone += abs(values[name] - before)
+        placed = [values[name] for name in self._stages]
+        gone: float = sum(map(abs, map(sub, placed, self._placed_with)))
         since = self._steepest * gone + drifts_um_s * (time_s - self._placed_s)
         return self._nearer_um + 2.0 * since
 
@@ -170,6 +174,9 @@ class Contacts:
                 self._links += [link] * len(parts)
                 self._slides += [slide] * len(parts)
                 self._corners += [part @ turn.T for part in parts]
+
+    def _bodies(self) -> Iterator[tuple[str, Slide]]:
+        return zip(self._links, self._slides, strict=True)
 
     def _pairs(self) -> tuple[Numbers, Numbers]:
         """Return the numbers of bodies that could ever meet: their travels overlap."""
@@ -206,13 +213,17 @@ class Contacts:
     ) -> dict[tuple[str, str], float]:
         low, high = self._low + positions, self._high + positions
         first, second = self._first, self._second
-        apart = np.maximum(low[first] - high[second], low[second] - high[first]).max(axis=1)
-        self._slack_um = float(apart.min(initial=math.inf))
+        gaps = np.maximum(low[first] - high[second], low[second] - high[first])
+        aparts = np.maximum.reduce(gaps, axis=1).tolist()
+        self._slack_um = min(aparts, default=math.inf)
         found: dict[tuple[str, str], float] = {}
-        for pair in np.flatnonzero(apart < 0.0).tolist():
+        for pair, apart in enumerate(aparts):
+            if apart >= 0.0:
+                continue
             one, two = int(first[pair]), int(second[pair])
             normals, reach = self._overlap(one, two)
-            depth = float((reach - normals @ (positions[two] - positions[one])).min())
+            depths = reach - normals @ (positions[two] - positions[one])
+            depth = float(np.minimum.reduce(depths))
             self._keep(found, (self._links[one], self._links[two]), depth)
         self._on_plate(found, values, positions, low)
         return found
@@ -234,7 +245,7 @@ class Contacts:
             self._faces[one, two] = faces[:, :3], -faces[:, 3]
         return self._faces[one, two]
 
-    def _top_um(self) -> float:
+    def _highest_um(self) -> float:
         """Return the height of the highest thing on the plate."""
         position = float(
             self._skeleton.pose(self._plate, dict.fromkeys(self._stage_names, 0.0))[2, 3]
@@ -249,15 +260,17 @@ class Contacts:
         low: Floats,
     ) -> None:
         """Add what stands in the plate or its clip: corners of one in the other."""
+        aboves = (low[self._above_plate, 2] - self._top_um).tolist()
+        nearest = min(aboves, default=math.inf)
+        self._slack_um = min(self._slack_um, nearest)
+        if nearest >= 0.0:
+            return
         plate = self._skeleton.pose(self._plate, values)
-        top = self._top_um()
-        for number in self._above_plate:
-            above = float(low[number, 2]) - top
-            self._slack_um = min(self._slack_um, above)
+        for number, above in zip(self._above_plate, aboves, strict=True):
             if above >= 0.0:
                 continue
             corners = (self._corners[number] + positions[number] - plate[:3, 3]) @ plate[:3, :3]
             for box in self._boxes:
-                inside = np.minimum(corners - box[0], box[1] - corners).min(axis=1)
-                depth = float(inside.max())
+                inside = np.minimum(corners - box[0], box[1] - corners)
+                depth = float(np.maximum.reduce(np.minimum.reduce(inside, axis=1)))
                 self._keep(found, (self._plate, self._links[number]), depth)

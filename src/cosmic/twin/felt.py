@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from cosmic.twin.fibre_state import FibreState
 from cosmic.twin.kinematics import Point
 
 
-@dataclass(frozen=True, slots=True)
-class Push:
+class Push(NamedTuple):
     """What one fibre does to the probe.
 
     Attributes
@@ -31,8 +31,7 @@ class Push:
     up_un: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Felt:
+class Felt(NamedTuple):
     """What the probe feels at one moment.
 
     Attributes
@@ -51,7 +50,10 @@ class Felt:
     @property
     def total_un(self) -> float:
         """Force on the probe, positive when it is pushed back."""
-        return sum((push.force_un for push in self.pushes), self.jaw_un)
+        total = self.jaw_un
+        for push in self.pushes:
+            total += push.force_un
+        return total
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,8 @@ import math
 import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from functools import partial
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -33,8 +34,7 @@ from cosmic.twin.rubbing import (
     Push,
     RubbedPush,
     Rubbing,
-    held_un,
-    rubbed_un,
+    given_um_un,
 )
 from cosmic.twin.section import Section
 from cosmic.twin.tools import Tool
@@ -94,8 +94,7 @@ class Carried:
     why: Why
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(NamedTuple):
     """The undeformed free part of a held fibre, as the probe meets it.
 
     Attributes
@@ -323,20 +322,18 @@ class Fibre:
 
     def strain(self, abscissa_um: float, force_un: float) -> float:
         """Return the strain at the clamp under a force there."""
-        hold = next(iter(self.holds.values()))
-        moment = abs(force_un) * self._arm_um(abscissa_um)
-        stiffness = self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2
-        if not self._section.even:
-            stiffness /= self._across_at_clamp(hold)
-        thick = self._section.thickness_um(hold.at_um, hold.fate.roll_rad)
-        return 0.5 * thick * moment / stiffness
+        return abs(force_un) * self._arm_um(abscissa_um) * self._strain_un_um()
 
-    def _across_at_clamp(self, hold: Hold) -> float:
-        """Return by how much more it gives way where it leaves the jaws."""
+    def _strain_un_um(self) -> float:
+        """Return the strain where it leaves the jaws for each uN um of moment there."""
+        hold = next(iter(self.holds.values()))
         key = hold.at_um, hold.fate.roll_rad
         if self._clamped is None or self._clamped[0] != key:
-            across, _, _ = self._section.flexibility(np.array([key[0]]), key[1])
-            self._clamped = key, float(across[0])
+            stiffness = self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2
+            if not self._section.even:
+                across, _, _ = self._section.flexibility(np.array([key[0]]), key[1])
+                stiffness /= float(across[0])
+            self._clamped = key, 0.5 * self._section.thickness_um(*key) / stiffness
         return self._clamped[1]
 
     def back_um(self, abscissa_um: float) -> float:
@@ -431,13 +428,8 @@ class Fibre:
             part = self._rubbing.follow(travel_um + back_um)
             found = self._held_at_one_end(hold, line.free, abscissa_um, probe, time_s)
             if found.askew is not None:
-                self._lifting.follow(
-                    lambda travel_um: found.forces_un(part, travel_um),
-                    travel_um,
-                    back_um,
-                    height_um,
-                    found.askew,
-                )
+                forces_un = partial(found.forces_un, part)
+                self._lifting.follow(forces_un, travel_um, back_um, height_um, found.askew)
             return found.push(part, self._lifting.part)
         distance = _rounded(line.reach_um + hold.depth_um + more[0].depth_um)
         return held_at_both_ends(
@@ -578,15 +570,13 @@ class _Curves:
         It is asked again and again at one travel, where the curves have one value each.
         """
         most = 1.0 if self.askew is None else self.askew.most
-        pairs = [
-            (each[0].force_un(travel_um), each[-1].force_un(travel_um)) for each in self.curves
+        (one, per_one), (other, per_other) = [
+            given_um_un(each[0].force_un(travel_um), each[-1].force_un(travel_um))
+            for each in (self.curves[0], self.curves[-1])
         ]
-
-        def force_un(held: float) -> float:
-            across = [held_un(down, up, held / most) for down, up in pairs]
-            return across[0] if len(across) == 1 else rubbed_un(across[0], across[1], part)
-
-        return force_un
+        per_one, per_other = per_one / most, per_other / most
+        grows, falls = 0.5 + 0.5 * part, 0.5 - 0.5 * part
+        return lambda held: grows / (one + per_one * held) + falls / (other + per_other * held)
 
     def push(self, part: float, held: float) -> PushCurve | Push:
         """Return the push for friction along the fibre, -1 to 1, and a part of the force up."""

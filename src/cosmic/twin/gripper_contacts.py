@@ -136,6 +136,10 @@ class GripperContacts:
     ----------
     gap_um : float
         How far jaws may open or close before they take or let go; as of the last look.
+    slack_um : float
+        How far tools may go before anything can happen to a fibre; as of the last look.
+    held : tuple of Fibre
+        Those in grippers, each once; as of the last look.
     """
 
     def __init__(
@@ -163,22 +167,18 @@ class GripperContacts:
         self._came_um: dict[int, tuple[Point, float]] = {}
         self._narrowest = min((each.settings.width_um for each in fibres), default=0.0)
         self._thickest = max((each.settings.width_um for each in fibres), default=0.0)
-        self.gap_um = 0.0
-        self._slack_um = 0.0
-        self._begun = False
+        self.gap_um = self.slack_um = 0.0
+        self.held: tuple[Fibre, ...] = ()
+        self._begun = self._settled = False
 
     @property
-    def held(self) -> list[Fibre]:
-        """The fibres in grippers, each once."""
-        return list(dict.fromkeys(self._in_hand.values()))
-
-    @property
-    def slack_um(self) -> float:
-        """How far tools may go before anything can happen to a fibre; as of the last look."""
-        return self._slack_um
+    def idle(self) -> bool:
+        """Whether nothing can happen as long as no jaws open or close."""
+        return self._settled and not (self._in_hand or self._clinging)
 
     def plate_changed(self, begin: int) -> None:
         """Take note that the fibres from number `begin` on lie on a new plate."""
+        self._settled = False
         widths = [each.settings.width_um for each in self.fibres[begin:]]
         self._narrowest = min(widths, default=0.0)
         self._thickest = max(widths, default=0.0)
@@ -189,20 +189,36 @@ class GripperContacts:
         if not self._begun:
             self._begun = True
             self._begin(around)
-        self._slack_um = CARRYING_UM if self._clinging else math.inf
+        self.slack_um = CARRYING_UM if self._clinging else math.inf
+        self._watch_all(around)
+        if self._in_hand:
+            for name, fibre in list(self._in_hand.items()):
+                if len(fibre.holds) == 1:
+                    self._carry(fibre, around.tools[name], around)
+        if self._clinging:
+            for number in list(self._clinging):
+                self._shake(number, around)
+        self.held = tuple(dict.fromkeys(self._in_hand.values())) if self._in_hand else ()
+
+    def _watch_all(self, around: Surroundings) -> None:
+        """Watch all jaws, unless they stand as they stood, with what they had."""
+        tools = around.tools
+        if self._settled:
+            for tool in tools.values():
+                if tool.gap_um != tool.before_um:
+                    break
+            else:
+                return
+        self._settled = all(each.gap_um == each.before_um for each in tools.values())
         self.gap_um = math.inf
-        for name, tool in around.tools.items():
+        for name, tool in tools.items():
             self._watch(name, tool, around)
-        for name, fibre in list(self._in_hand.items()):
-            if len(fibre.holds) == 1:
-                self._carry(fibre, around.tools[name], around)
-        for number in list(self._clinging):
-            self._shake(number, around)
 
     def _watch(self, name: str, tool: Tool, around: Surroundings) -> None:
         """Take, keep or let go with one gripper, as its gap changes."""
         gap = tool.gap_um
-        self._widest[name] = max(self._widest.get(name, gap), gap)
+        if gap > self._widest.get(name, -math.inf):
+            self._widest[name] = gap
         held = self._in_hand.get(name)
         if held is not None:
             if gap > held.settings.width_um:
@@ -275,7 +291,7 @@ class GripperContacts:
     def _carry(self, fibre: Fibre, tool: Tool, around: Surroundings) -> None:
         fate = fibre.holds[tool.name].fate
         if fibre.on_plate or fate.slip_at_um < math.inf or fate.drop_after_um < math.inf:
-            self._slack_um = min(self._slack_um, CARRYING_UM)
+            self.slack_um = min(self.slack_um, CARRYING_UM)
         if fibre.on_plate:
             height = max(fibre.height_um(tool), 0.0)
             pull = fibre.pull_un(height, around.time_s)
@@ -343,6 +359,7 @@ class GripperContacts:
     def _open(self, fibre: Fibre, tool: Tool, around: Surroundings) -> None:
         """Open the jaws around a fibre: the other gripper keeps it, or it falls, or it sticks."""
         name = tool.name
+        self._settled = False
         self._widest[name] = tool.gap_um
         if len(fibre.holds) > 1:
             del self._in_hand[name], fibre.holds[name]
@@ -367,6 +384,7 @@ class GripperContacts:
         self._clinging[fibre.number] = Clinging(self._handling, key, around.anchor(anchor))
 
     def _lose(self, fibre: Fibre, tool: Tool, around: Surroundings, event: str) -> None:
+        self._settled = False
         self._record(
             event, fibre=fibre.number, tool=tool.name, height_um=max(fibre.height_um(tool), 0.0)
         )

@@ -32,8 +32,9 @@ class Guideways:
                 self._yaw[name] = across, 0.5 * side * kind.yaw_um, rate, math.pi * phase
             if kind.reversal or kind.lag_part:
                 self._loose[name] = 0.5 * kind.reversal, kind.lag_part, kind.lag_s
-        self._lag_times_s = {lag_s for _, part, lag_s in self._loose.values() if part}
+        self._lag_s = {name: lag_s for name, (_, _, lag_s) in self._loose.items()}
         self._play: dict[str, float] = {}
+        self._aside: dict[str, float] = {}
         self._lag: dict[str, float] = {}
         self._lagging = 0.0
         self._before: dict[str, float] = {}
@@ -62,34 +63,52 @@ class Guideways:
         Times rise from call to call.
         """
         passed_s, self._time_s = time_s - self._time_s, time_s
-        kept = {lag_s: math.exp(-passed_s / lag_s) for lag_s in self._lag_times_s}
         if values != self._before:
             self._move(values)
-        found = dict(self._played)
-        lagging = 0.0
+        found = self._played.copy()
+        lagging, kept, kept_for_s = 0.0, 1.0, -1.0
         for name, before in self._lag.items():
-            lag = before * kept[self._loose[name][2]]
+            if self._lag_s[name] != kept_for_s:  # mostly all stages have the same
+                kept_for_s = self._lag_s[name]
+                kept = math.exp(-passed_s / kept_for_s)
+            lag = before * kept
             self._lag[name] = lag
             found[name] -= lag
-            lagging = max(lagging, abs(lag))
+            if abs(lag) > lagging:
+                lagging = abs(lag)
         self._lagging = lagging
         return found
 
     def _move(self, values: Mapping[str, float]) -> None:
         """Take note that stages are led elsewhere: what has play stays behind, the rest lags."""
-        before, self._before = self._before, dict(values)
-        self._played = self.led(values)
-        for name, (half, part, _) in self._loose.items():
-            if name not in values:
-                continue
+        before = self._before
+        moved = [name for name, at in values.items() if at != before.get(name)]
+        for name in moved:
+            if name in self._yaw:
+                across, half, rate, phase = self._yaw[name]
+                self._aside[across] = half * (
+                    math.sin(rate * values[name] + phase) - math.sin(phase)
+                )
+                if across in values and across not in moved:
+                    self._lead(across, values[across])
+        for name in moved:
             at = values[name]
-            if half:
-                play = min(max(self._play.get(name, at), at - half), at + half)
-                self._play[name] = play
-                self._played[name] += play - at
-            moved = part * (at - before.get(name, at))
-            if moved:
-                self._lag[name] = self._lag.get(name, 0.0) + moved
+            self._lead(name, at)
+            part = self._loose[name][1] if name in self._loose else 0.0
+            lagged = part * (at - before.get(name, at))
+            if lagged:
+                self._lag[name] = self._lag.get(name, 0.0) + lagged
+        self._before = dict(values)
+
+    def _lead(self, name: str, at: float) -> None:
+        """Take note of where one stage is with its play, but for its lag."""
+        led = at * self._scale.get(name, 1.0) + self._aside.get(name, 0.0)
+        half = self._loose[name][0] if name in self._loose else 0.0
+        if half:
+            play = min(max(self._play.get(name, at), at - half), at + half)
+            self._play[name] = play
+            led += play - at
+        self._played[name] = led
 
     @property
     def restless_s(self) -> float:

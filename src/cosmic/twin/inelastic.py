@@ -16,6 +16,12 @@ CELLS: Final = 16
 TIMES_S: Final = np.array([0.03, 0.3, 3.0, 30.0, 300.0])
 """One for each decade; what is slower does not show in a measurement."""
 
+ALL_TIMES: Final = np.ones(len(TIMES_S))
+SAME_TIME: Final = 1e-9
+"""Part by which times between looks differ that are the same but for rounding."""
+
+FADING_PER_S: Final = -1.0 / TIMES_S[:, None]
+
 FULLEST: Final = 1.45
 """Moment, in that of first yield, up to which a section is followed; it ends at 1.5."""
 
@@ -49,36 +55,53 @@ class Inelastic:
         self._yield = yield_curvature
         self._creeping = np.zeros((len(TIMES_S), CELLS))
         self._set = np.zeros(CELLS)
+        self._has_set = False
         self._before = np.zeros(CELLS)
         self._time_s = 0.0
         self._loaded_s = 0.0
         self._force_un = 0.0
         self._arm_um, self._levers = 0.0, np.zeros(CELLS)
+        self._kept, self._kept_for_s = np.ones((len(TIMES_S), 1)), 0.0
 
     def offset_um(self, arm_um: float) -> float:
         """Return how far the fibre stands back, at so far from the clamp."""
-        arms = self._levers_um(arm_um) * self._cell_um
-        return float(self._slope * (self._creeping @ arms).sum() + self._set @ arms)
+        levers = self._levers_um(arm_um)
+        crept = self._slope * float(ALL_TIMES.dot(self._creeping.dot(levers)))
+        return self._cell_um * (crept + float(self._set.dot(levers)) if self._has_set else crept)
 
     def follow(self, time_s: float, force_un: float, arm_um: float, ei_un_um2: float) -> None:
         """Take note of the force there from now on; times rise."""
         passed_s, self._time_s = time_s - self._time_s, time_s
-        kept = np.exp(-passed_s / TIMES_S)[:, None]
-        self._creeping = self._before + (self._creeping - self._before) * kept
+        creeping, kept = self._creeping, self._kept
+        if abs(passed_s - self._kept_for_s) > SAME_TIME * passed_s:
+            self._kept_for_s = passed_s
+            np.exp(np.multiply(FADING_PER_S, passed_s, out=kept), out=kept)
+        creeping -= self._before
+        creeping *= kept
+        creeping += self._before
         if abs(force_un - self._force_un) > 1e-3 * abs(self._force_un) + 1e-3:
             self._loaded_s = time_s
         self._force_un = force_un
-        self._before = self._levers_um(arm_um) * (force_un / ei_un_um2)
-        if abs(float(self._before[0])) > self._yield:  # no cell bends more than that at the clamp
-            part = np.minimum(np.abs(self._before) / self._yield, FULLEST)
-            beyond = np.where(part > 1.0, 1.0 / np.sqrt(3.0 - 2.0 * part) - part, 0.0)
-            grown = np.maximum(np.abs(self._set), self._yield * beyond)
-            self._set = np.where(beyond > 0.0, np.copysign(grown, self._before), self._set)
+        bend = force_un / ei_un_um2
+        np.multiply(self._levers_um(arm_um), bend, out=self._before)
+        # No cell bends more than the one at the clamp.
+        if abs(bend) * max(arm_um - 0.5 * self._cell_um, 0.0) > self._yield:
+            self._yielded()
+
+    def _yielded(self) -> None:
+        """Take note of what sets where the surface yields."""
+        part = np.minimum(np.abs(self._before) / self._yield, FULLEST)
+        beyond = np.where(part > 1.0, 1.0 / np.sqrt(3.0 - 2.0 * part) - part, 0.0)
+        grown = np.maximum(np.abs(self._set), self._yield * beyond)
+        self._set = np.where(beyond > 0.0, np.copysign(grown, self._before), self._set)
+        self._has_set = True
 
     def _levers_um(self, arm_um: float) -> Floats:
         """Return how far each cell is from a force so far from the clamp; asked for often."""
         if arm_um != self._arm_um:
-            self._arm_um, self._levers = arm_um, np.maximum(arm_um - self._at_um, 0.0)
+            self._arm_um = arm_um
+            np.subtract(arm_um, self._at_um, out=self._levers)
+            np.maximum(self._levers, 0.0, out=self._levers)
         return self._levers
 
     @property

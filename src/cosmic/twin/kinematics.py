@@ -20,6 +20,7 @@ Floats = npt.NDArray[np.float64]
 Point = tuple[float, float, float]
 
 UM_PER_M: Final = 1e6
+_NOWHERE: Final = np.eye(4)
 _KINDS: Final = ("fixed", "prismatic", "revolute", "continuous")
 
 
@@ -104,12 +105,20 @@ class Skeleton:
         missing = [name for name in drives if name not in known]
         if missing:
             raise ConfigError(f"{path}: there is no joint {missing[0]!r}, which a stage drives")
+        self._posed: dict[str, tuple[list[float], Floats]] = {}
+        self._chains: dict[str, list[Joint]] = {}
 
     def pose(self, link: str, values: Mapping[str, float]) -> Floats:
-        """Return `world_from_link`, shape (4, 4), um, with the stages at `values`."""
-        pose = np.eye(4)
-        for joint in self._chain(link):
-            pose = pose @ joint.parent_from_child(values)
+        """Return `world_from_link`, shape (4, 4), um, with the stages at `values`; not to write."""
+        chain = self._chain(link)
+        led = [values[each.drive.stage] for each in chain if each.drive is not None]
+        before, pose = self._posed.get(link, ([], _NOWHERE))
+        if pose is _NOWHERE or led != before:
+            pose = np.eye(4)
+            for joint in chain:
+                pose = pose @ joint.parent_from_child(values)
+            pose.flags.writeable = False
+            self._posed[link] = led, pose
         return pose
 
     def fixed(self, link: str) -> bool:
@@ -155,8 +164,11 @@ class Skeleton:
 
     def _chain(self, link: str) -> list[Joint]:
         """Return the joints from the root to `link`."""
+        if link in self._chains:
+            return self._chains[link]
         if link not in self._joint_of:
             raise ConfigError(f"{self._path}: there is no link {link!r} on a joint")
+        found = link
         chain: list[Joint] = []
         while link in self._joint_of:
             if len(chain) > len(self._joint_of):
@@ -164,7 +176,8 @@ class Skeleton:
             joint = self._joint_of[link]
             chain.append(joint)
             link = joint.parent
-        return chain[::-1]
+        self._chains[found] = chain[::-1]
+        return self._chains[found]
 
 
 class _Zeros(dict[str, float]):

@@ -50,6 +50,7 @@ class ToolOffsets:
                 amplitude = direction[0] * size, direction[1] * size, direction[2] * size
                 self._drift[name] = amplitude, 2.0 * math.pi / period_s, phase
         self.tools = tuple(tools)
+        self._places = self._where()
         drifts = self._drift.values()
         self._fastest_um_s = max(
             (math.hypot(*drift) * rate for drift, rate, _ in drifts), default=0.0
@@ -71,20 +72,24 @@ class ToolOffsets:
         if any(offset_um):
             bent[tool] = offset_um
         self._bent = bent
+        self._places = self._where()
+
+    def _where(self) -> dict[str, tuple[Point, Point, float, float, float]]:
+        """Return where each tool is without drift, and how it drifts: each look asks for it."""
+        found = {}
+        for tool in self.tools:
+            x, y, z = self._mounted.get(tool, NOWHERE)
+            bent = self._bent.get(tool, NOWHERE)
+            direction, rate, phase = self._drift.get(tool, (NOWHERE, 0.0, 0.0))
+            place = x + bent[0], y + bent[1], z + bent[2]
+            found[tool] = place, direction, rate, phase, math.sin(phase)
+        return found
 
     def at(self, tool: str, time_s: float) -> Point:
         """Return the offset of a tool at a time, um, world."""
-        if self.still:
+        place = self._places.get(tool)
+        if place is None:
             return NOWHERE
-        x, y, z = self._mounted.get(tool, NOWHERE)
-        bent = self._bent.get(tool, NOWHERE)
-        drift = self._drift.get(tool)
-        if drift is None:
-            return x + bent[0], y + bent[1], z + bent[2]
-        direction, rate, phase = drift
-        part = math.sin(rate * time_s + phase) - math.sin(phase)
-        return (
-            x + bent[0] + part * direction[0],
-            y + bent[1] + part * direction[1],
-            z + bent[2] + part * direction[2],
-        )
+        (x, y, z), (dx, dy, dz), rate, phase, began = place
+        part = math.sin(rate * time_s + phase) - began
+        return x + part * dx, y + part * dy, z + part * dz

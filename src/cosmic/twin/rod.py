@@ -6,6 +6,7 @@ tension and deflection tied by the stretching of fibre and grippers; good for sl
 A fibre held at one end is in `cantilever`.
 """
 
+import math
 from bisect import bisect_right
 from functools import lru_cache
 from typing import Final
@@ -45,7 +46,7 @@ class PushCurve:
         Way at which the fibre slides off, or the end of what is laid out.
     """
 
-    __slots__ = ("alongs_un", "forces_un", "reach_um", "travels_um")
+    __slots__ = ("_asked", "alongs_un", "forces_un", "reach_um", "travels_um")
 
     def __init__(
         self,
@@ -64,29 +65,35 @@ class PushCurve:
         self.forces_un: list[float] = forces_un.tolist()
         self.alongs_un: list[float] = [] if alongs_un is None else alongs_un.tolist()
         self.reach_um: float = self.travels_um[-1]
+        self._asked = math.nan, (0.0, 0.0)
 
     def force_un(self, travel_um: float) -> float:
         """Return the force after a travel; the same with the opposite sign on the other side."""
-        return self._at(self.forces_un, travel_um)
+        return self.both_un(travel_um)[0]
 
     def along_un(self, travel_um: float) -> float:
         """Return the force along the fibre on the probe, outwards."""
-        return self._at(self.alongs_un, travel_um) if self.alongs_un else 0.0
+        return self.both_un(travel_um)[1]
 
     def both_un(self, travel_um: float) -> tuple[float, float]:
         """Return the force across and the force along, as a look needs both."""
-        return self.force_un(travel_um), self.along_un(travel_um)
-
-    def _at(self, forces: list[float], travel_um: float) -> float:
-        travels, pushed_um = self.travels_um, abs(travel_um)
+        asked_um, found = self._asked
+        if travel_um == asked_um:  # a look asks several times for one travel
+            return found
+        travels, forces, alongs = self.travels_um, self.forces_un, self.alongs_un
+        pushed_um = abs(travel_um)
         if pushed_um >= self.reach_um:
-            force = forces[-1]
+            force, along = forces[-1], alongs[-1] if alongs else 0.0
         else:
             # A curve is used for few points, one after another: no array is worth its call.
             after = bisect_right(travels, pushed_um)
-            part = (pushed_um - travels[after - 1]) / (travels[after] - travels[after - 1])
-            force = forces[after - 1] + part * (forces[after] - forces[after - 1])
-        return force if travel_um >= 0.0 else -force
+            low = after - 1
+            part = (pushed_um - travels[low]) / (travels[after] - travels[low])
+            force = forces[low] + part * (forces[after] - forces[low])
+            along = alongs[low] + part * (alongs[after] - alongs[low]) if alongs else 0.0
+        found = (force, along) if travel_um >= 0.0 else (-force, -along)
+        self._asked = travel_um, found
+        return found
 
 
 @lru_cache(maxsize=128)

@@ -1,5 +1,6 @@
 """Friction where the probe touches a fibre: along it, and up and down the probe."""
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -102,14 +103,16 @@ class Lifting:
         if travel_um <= 0.0:
             self.part = 0.0
             return 0.0
-        before = max(forces_un(crept_um)(self.part), 0.0)
-        held = self.part * before
-        part = self.part
+        part, ratio, most = self.part, askew.ratio, askew.most
+        before = max(forces_un(crept_um)(part), 0.0)
+        held = part * before + rose_um / askew.up_um_un
         force_un = forces_un(travel_um)
         for _ in range(ROUNDS):
             now = force_un(part)
-            up = held + askew.ratio * (now - before) + rose_um / askew.up_um_un
-            part = min(max(up / max(now, LEAST_UN), -askew.most), askew.most)
+            slides = (held + ratio * (now - before)) / max(now, LEAST_UN)
+            was, part = part, most if slides > most else max(slides, -most)
+            if part == was:
+                break
         self.part = part
         return part
 
@@ -142,12 +145,19 @@ def held_un(down_un: float, up_un: float, part: float) -> float:
     return 2.0 / ((1.0 + part) / down_un + (1.0 - part) / up_un)
 
 
+def given_um_un(down_un: float, up_un: float) -> tuple[float, float]:
+    """Return what `held_un` is the inverse of, for a part of 0, and how it grows with the part."""
+    if not down_un * up_un > 0.0:
+        return math.inf, 0.0
+    return 0.5 / down_un + 0.5 / up_un, 0.5 / down_un - 0.5 / up_un
+
+
 def rubbed_un(growing_un: float, falling_un: float, part: float) -> float:
     """Return the force between those of a growing and of a falling push."""
     return 0.5 * (growing_un + falling_un) + 0.5 * part * (growing_un - falling_un)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class HeldPush(Push):
     """A push with friction up or down: what it gives way follows between the two, evenly.
 
@@ -181,7 +191,7 @@ class HeldPush(Push):
         return across, across * along / one if one else 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class RubbedPush(Push):
     """A push between a growing and a falling one."""
 

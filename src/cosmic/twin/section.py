@@ -78,6 +78,7 @@ class Section:
                 settings.length_um, settings.ei_variation, settings.ei_length_um, key
             )
         self._hinges_um = _places(settings, key)
+        self._turned = (math.nan, math.nan), (1.0, 0.0)
 
     @property
     def even(self) -> bool:
@@ -90,10 +91,16 @@ class Section:
         turn = self._settings.orientation_deg + 1e-3 * self._settings.twist_deg_mm * along_um
         return np.asarray(np.radians(turn) + roll_rad)
 
-    def _angle_at_rad(self, at_um: float, roll_rad: float) -> float:
-        """Return the same at one place, as each look asks: an array is not worth its call."""
-        each = self._settings
-        return math.radians(each.orientation_deg + 1e-3 * each.twist_deg_mm * at_um) + roll_rad
+    def _turn_at(self, at_um: float, roll_rad: float) -> tuple[float, float]:
+        """Return cosine and sine of that at one place; each look asks, mostly for the same."""
+        each, at = self._settings, (at_um, roll_rad)
+        key, found = self._turned
+        if at != key:
+            turn_deg = each.orientation_deg + 1e-3 * each.twist_deg_mm * at_um
+            angle = math.radians(turn_deg) + roll_rad
+            found = math.cos(angle), math.sin(angle)
+            self._turned = at, found
+        return found
 
     def flexibility(self, along_um: Floats, roll_rad: float) -> tuple[Floats, Floats, Floats]:
         """Return across, askew and up by how much it gives way more than an even flat one.
@@ -122,16 +129,16 @@ class Section:
         width, thick = self._settings.width_um, self._settings.thickness_um
         if self._settings.plane_ratio <= 1.0:
             return width if self._settings.thick_as_wide else thick
-        angle = self._angle_at_rad(at_um, roll_rad)
-        return math.hypot(thick * math.cos(angle), width * math.sin(angle))
+        cos, sin = self._turn_at(at_um, roll_rad)
+        return math.hypot(thick * cos, width * sin)
 
     def seen_um(self, at_um: float, roll_rad: float) -> float:
         """Return how wide it looks from above."""
         width, thick = self._settings.width_um, self._settings.thickness_um
         if self._settings.plane_ratio <= 1.0:
             return width
-        angle = self._angle_at_rad(at_um, roll_rad)
-        return math.hypot(width * math.sin(angle), thick * math.cos(angle))
+        cos, sin = self._turn_at(at_um, roll_rad)
+        return math.hypot(width * sin, thick * cos)
 
     def shear_um_un(self, length_um: float, thickness_um: float, ei_un_um2: float) -> float:
         """Return by how much it gives way in shear over a length, um/uN."""

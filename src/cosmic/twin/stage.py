@@ -7,6 +7,7 @@ stage.
 
 import math
 import random
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
@@ -53,7 +54,7 @@ class Path:
             return positions[-1] + (self.creep_per_s * creeping_s if creeping_s > 0.0 else 0.0)
         if time_s <= times_s[0]:
             return positions[0]
-        after = next(index for index, knot_s in enumerate(times_s) if time_s < knot_s)
+        after = bisect_right(times_s, time_s)
         start_s, start = times_s[after - 1], positions[after - 1]
         part = (time_s - start_s) / (times_s[after] - start_s)
         return start + part * (positions[after] - start)
@@ -65,7 +66,7 @@ class Path:
             return 0.0, math.inf
         if time_s < times_s[0]:
             return 0.0, times_s[0]
-        after = next(index for index, knot_s in enumerate(times_s) if time_s < knot_s)
+        after = bisect_right(times_s, time_s)
         distance = abs(positions[after] - positions[after - 1])
         return distance / (times_s[after] - times_s[after - 1]), times_s[after]
 

@@ -76,8 +76,9 @@ class Track:
 
     def path(self, time_s: float) -> Path:
         """Return the movement in force at `time_s`, which never falls."""
-        paths = self._paths
-        after = self._current + 1
+        paths, after = self._paths, self._current + 1
+        if after == len(paths):
+            return paths[-1]
         while after < len(paths) and paths[after].times_s[0] <= time_s:
             after += 1
         self._current = after - 1
@@ -87,14 +88,16 @@ class Track:
         """Return where the stage is at `time_s`, which never falls."""
         low, high = self.stage.bounds
         path = self.path(time_s)
-        self.rests = path.end_s <= time_s and self._current + 1 == len(self._paths)
-        return min(max(path.at(time_s), low), high)
+        self.rests = path.times_s[-1] <= time_s and self._current + 1 == len(self._paths)
+        at = path.at(time_s)
+        return low if at < low else min(at, high)
 
     def leg(self, time_s: float) -> tuple[float, float]:
         """Return its speed at `time_s` without sign, and until when it stays so."""
         speed, end_s = self.path(time_s).leg(time_s)
-        if self._current + 1 < len(self._paths):
-            end_s = min(end_s, self._paths[self._current + 1].times_s[0])
+        after = self._current + 1
+        if after < len(self._paths):
+            end_s = min(end_s, self._paths[after].times_s[0])
         return speed, end_s
 
 
@@ -246,16 +249,21 @@ class Timeline:
             LONGEST_REST_S, self._workspace.restless_s, self._guideways.restless_s
         )
         at_rest = True
-        felt, grippers = self._felt, self._workspace.gripper_stages
-        travel = max(LONGEST_TRAVEL, SLACK_PART * felt.slack_um)
-        gap = max(LONGEST_TRAVEL, SLACK_PART * min(felt.slack_um, felt.gap_um))
         for track in self._tracks:
             if track.rests:
                 continue
             speed, end_s = track.leg(now_s)
             if speed > 0.0:
                 at_rest = False
-                longest = gap if track.stage.name in grippers else travel
-                end_s = min(end_s, now_s + longest / speed)
-            until_s = min(until_s, end_s)
+                end_s = min(end_s, now_s + self._longest(track) / speed)
+            if end_s < until_s:
+                until_s = end_s
         return until_s, at_rest
+
+    def _longest(self, track: Track) -> float:
+        """Return how far a stage that moves goes until the next look."""
+        felt = self._felt
+        slack = felt.slack_um
+        if track.stage.name in self._workspace.gripper_stages:
+            slack = min(slack, felt.gap_um)
+        return max(LONGEST_TRAVEL, SLACK_PART * slack)

@@ -64,7 +64,9 @@ class Gripper:
         """
         gap = values[self._stage]
         before = gap if before_um is None else before_um
-        return Tool(name, added(self._hold.at(values), offset), self._forward, gap, before)
+        x, y, z = self._hold.at(values)
+        hold = x + offset[0], y + offset[1], z + offset[2]
+        return Tool(name, hold, self._forward, gap, before)
 
 
 def added(point: Point, offset: Point) -> Point:

@@ -29,7 +29,7 @@ class Transducer:
     """
 
     def __init__(self, settings: ForceSensorSettings, chance: np.random.Generator) -> None:
-        self._settings = settings
+        self._bend_per_un = settings.linearity / settings.range_un
         self.cross_part = settings.cross_talk * float(chance.standard_normal())
         self.axial_part = settings.axial_talk * float(chance.standard_normal())
         self._lag_part = settings.hysteresis / (2.0 * PLAY_PART)
@@ -43,11 +43,11 @@ class Transducer:
         if self.cross_part or self.axial_part:
             for push in felt.pushes:
                 signal += self.cross_part * push.along_un + self.axial_part * push.up_un
-        if self._settings.linearity:
-            signal *= 1.0 + self._settings.linearity * abs(force) / self._settings.range_un
+        signal *= 1.0 + self._bend_per_un * abs(force)
         if self._lag_part:
             low, high = force - self._play_un, force + self._play_un
-            self._lagging_un = min(max(self._lagging_un, low), high)
+            lagging = self._lagging_un
+            self._lagging_un = low if lagging < low else min(lagging, high)
             signal += self._lag_part * (self._lagging_un - force)
         return signal
 
@@ -70,10 +70,12 @@ class Flicker:
         self._kept = np.exp(-2.0 * math.pi * rates * TICK_S)
         self._sigma = np.full(decades, math.sqrt(density_un2_hz * corner_hz * math.log(10.0)))
         self._fresh = self._sigma * np.sqrt(1.0 - self._kept * self._kept)
-        self._state = self._sigma * chance.standard_normal(decades)
+        self._parts: list[float] = self._kept.tolist()
+        state = self._sigma * chance.standard_normal(decades)
+        self._state: list[float] = state.tolist()
         self._tick = 0
         self._times_s: list[float] = [0.0]
-        self._values: list[float] = [float(self._state.sum())]
+        self._values: list[float] = [float(state.sum())]
 
     def at(self, times_s: Floats) -> Floats:
         """Return the noise at rising times, uN."""
@@ -81,21 +83,22 @@ class Flicker:
         first = math.floor(float(times_s[0]) / TICK_S) - 1
         if first - self._tick > LONGEST_TICKS:
             kept = self._kept ** (first - self._tick)
-            self._steps(first, kept, self._sigma * np.sqrt(1.0 - kept * kept), 1)
+            fresh = self._sigma * np.sqrt(1.0 - kept * kept)
+            self._steps(first, kept.tolist(), fresh, 1)
         if self._tick < last:
-            self._steps(self._tick + 1, self._kept, self._fresh, last - self._tick)
+            self._steps(self._tick + 1, self._parts, self._fresh, last - self._tick)
         past = 0
         while past + 2 < len(self._times_s) and self._times_s[past + 1] < TICK_S * first:
             past += 1
         del self._times_s[:past], self._values[:past]
         return np.asarray(np.interp(times_s, self._times_s, self._values))
 
-    def _steps(self, tick: int, kept: Floats, fresh: Floats, count: int) -> None:
+    def _steps(self, tick: int, parts: list[float], fresh: Floats, count: int) -> None:
         """Walk on to a tick and so many from there; for a few numbers no array is worth it."""
-        drawn = (fresh * self._chance.standard_normal((count, len(kept)))).tolist()
-        state, parts = self._state.tolist(), kept.tolist()
+        drawn = (fresh * self._chance.standard_normal((count, len(parts)))).tolist()
+        state = self._state
         for number, each in enumerate(drawn, start=tick):
             state = [part * was + new for part, was, new in zip(parts, state, each, strict=True)]
             self._times_s.append(TICK_S * number)
             self._values.append(math.fsum(state))
-        self._state, self._tick = np.array(state), tick + count - 1
+        self._state, self._tick = state, tick + count - 1

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from cosmic.frame.errors import NotAvailable
+from cosmic.twin.clearance import Clearance
 from cosmic.twin.climate import Climate
 from cosmic.twin.contacts import PLATE_HALF_UM, Contacts
 from cosmic.twin.felt import Felt, Moment, Push
@@ -27,6 +28,8 @@ PROBE: Final = "probe"
 
 class Around:
     """Where everything is at one look; see `Surroundings`."""
+
+    __slots__ = ("_plate", "_values", "_workspace", "time_s", "tools")
 
     def __init__(
         self,
@@ -120,8 +123,12 @@ class Workspace:
         self._peaks_un: dict[int | str, float] = {}
         self._jaw_touches = {name: Touch() for name in self._grippers}
         self._gaps: dict[str, float] = {}
-        self._slack_um = 0.0
         self.gripper_stages = frozenset(each.stage for each in self._geometry.grippers.values())
+        self._jaw_stages = [(name, each.stage) for name, each in self._geometry.grippers.items()]
+        jaws = [slide for each in self._grippers.values() for slide in each.slides]
+        self._clear = Clearance([self._probe, *jaws], self.gripper_stages)
+        self._clear_after_um = self._jaws_clear_um = 0.0
+        self._slack_um = 0.0
         self._contacts: Contacts | None = None
         if folder is not None:
             self._contacts = Contacts(settings, folder, skeleton, self._record)
@@ -169,23 +176,67 @@ class Workspace:
     def look(self, values: Mapping[str, float], time_s: float) -> Felt:
         """Take everything to where the stages are now, and return what the probe feels."""
         self._time_s = time_s
+        slack_um = self._without_jaws_um(values, time_s)
+        if slack_um is not None and slack_um < self._clear_after_um:
+            self._clear.pass_by()
+            return Felt((), 0.0, slack_um, self._gripper_contacts.gap_um)
+        if self._clear.passed:
+            self._look_back()
+        return self._look_at_all(values, time_s, slack_um)
+
+    def _without_jaws_um(self, values: Mapping[str, float], time_s: float) -> float | None:
+        """Return the slack of all bodies where jaws need not be asked, else None."""
+        clear, drift_um_s = self._clear, self.offsets.fastest_um_s
+        if self._contacts is None or clear.left_um <= 0.0 or drift_um_s is None:
+            return None
+        for name, stage in self._jaw_stages:
+            if values[stage] != self._gaps[name]:
+                return None
+        self._clear_after_um = clear.after_um(values, time_s, drift_um_s)
+        if self._clear_after_um <= 0.0:
+            return None
+        return self._contacts.look(values, time_s, self.offsets)
+
+    def _look_back(self) -> None:
+        """Have the jaws see the last look, which left them out: they know where they came from."""
+        values, time_s = self._clear.before()
+        probe = added(self._probe.at(values), self.offsets.at(PROBE, time_s))
+        for name, tool in self._tools(values, time_s).items():
+            self._jaw(name, tool, probe)
+
+    def _look_at_all(
+        self, values: Mapping[str, float], time_s: float, bodies_um: float | None
+    ) -> Felt:
+        """Return what the probe feels; `bodies_um` as of this look, None: not asked for yet."""
         tools = self._tools(values, time_s)
         around = Around(self, values, tools, time_s)
-        self._gripper_contacts.look(around)
-        self._gaps = {name: tool.gap_um for name, tool in tools.items()}
+        grippers = self._gripper_contacts
+        grippers.look(around)
         probe = added(self._probe.at(values), self.offsets.at(PROBE, time_s))
-        self._slack_um = self._gripper_contacts.slack_um
-        pushes = tuple(
-            push
-            for fibre in self._gripper_contacts.held
-            if (push := self._push(fibre, tools, probe, around)) is not None
-        )
-        if self._contacts is not None:
-            self._nothing_before(self._contacts.look(values, time_s, self.offsets))
-        on_jaws = {name: self._jaw(name, tool, probe) for name, tool in tools.items()}
-        self._note(pushes, on_jaws)
-        jaw_un = sum(on_jaws.values())
-        return Felt(pushes, jaw_un, self._slack_um, self._gripper_contacts.gap_um)
+        self._slack_um = grippers.slack_um
+        pushes: tuple[Push, ...] = ()
+        for fibre in grippers.held:
+            push = self._push(fibre, tools, probe, around)
+            if push is not None:
+                pushes += (push,)
+        if bodies_um is None and self._contacts is not None:
+            bodies_um = self._contacts.look(values, time_s, self.offsets)
+        if bodies_um is not None:
+            self._nothing_before(bodies_um)
+        self._jaws_clear_um = math.inf
+        on_jaws: dict[str, float] = {}
+        for name, tool in tools.items():
+            self._gaps[name] = tool.gap_um
+            force = self._jaw(name, tool, probe)
+            if force:
+                on_jaws[name] = force
+        if pushes or on_jaws or self._peaks_un:
+            self._note(pushes, on_jaws)
+        if grippers.idle and self._jaws_clear_um > self._slack_um:
+            self._clear.begin(values, time_s, self._jaws_clear_um)
+        else:
+            self._clear.end()
+        return Felt(pushes, sum(on_jaws.values(), 0.0), self._slack_um, grippers.gap_um)
 
     def change_plate(
         self, values: Mapping[str, float], number: int, fibres: tuple[FibreSettings, ...]
@@ -213,6 +264,7 @@ class Workspace:
             for place, each in enumerate(fibres)
         ]
         self._gripper_contacts.plate_changed(begin)
+        self._clear.left_um = 0.0
         record_plate(self._truth, self._time_s, number, begin, fibres)
 
     def check_plate_change(self, values: Mapping[str, float]) -> None:
@@ -235,11 +287,13 @@ class Workspace:
 
     def _nothing_before(self, slack_um: float) -> None:
         """Take note that something may happen after so much way."""
-        self._slack_um = min(self._slack_um, max(slack_um, 0.0))
+        if slack_um < self._slack_um:
+            self._slack_um = max(slack_um, 0.0)
 
     def _tools(self, values: Mapping[str, float], time_s: float) -> dict[str, Tool]:
+        at, before = self.offsets.at, self._gaps.get
         return {
-            name: each.tool(name, values, self.offsets.at(name, time_s), self._gaps.get(name))
+            name: each.tool(name, values, at(name, time_s), before(name))
             for name, each in self._grippers.items()
         }
 
@@ -257,14 +311,18 @@ class Workspace:
     def _push(
         self, fibre: Fibre, tools: dict[str, Tool], probe: Point, around: Around
     ) -> Push | None:
-        if len(fibre.holds) == 2:
-            fibre.slip(fibre.line(tools).reach_um)
         line = fibre.line(tools)
-        touch = self._touches.setdefault(fibre.number, Touch())
+        if line.free is None:
+            fibre.slip(line.reach_um)
+            line = fibre.line(tools)
+        touch = self._touches.get(fibre.number)
+        if touch is None:
+            touch = self._touches[fibre.number] = Touch()
         along = line.abscissa_um(probe[0] + self._geometry.probe_contact_um)
         back = fibre.back_um(along)
         travel = line.y_um(along) + fibre.seen_um / 2.0 - probe[1] - back
-        reach = self._reach(fibre, line, along, probe[2])
+        higher = line.z_um(along) - probe[2]
+        reach = self._reach(fibre, line, along, higher)
         jump = fibre.jump_um(along, self._time_s) if line.free is not None else 0.0
         if not touch.look(reach, travel + jump):
             self._nothing_before(max(-reach, -travel - jump))
@@ -278,7 +336,7 @@ class Workspace:
             self._probe_shape,
             self._time_s,
             back_um=back,
-            height_um=line.z_um(along) - probe[2],
+            height_um=higher,
         )
         force, along_un = curve.both_un(travel)
         if travel > curve.reach_um:
@@ -308,17 +366,14 @@ class Workspace:
             return False
         return True
 
-    def _reach(self, fibre: Fibre, line: Line, along_um: float, probe_z_um: float) -> float:
+    def _reach(self, fibre: Fibre, line: Line, along_um: float, higher_um: float) -> float:
         thick = self._geometry.probe_half_width_um + fibre.settings.thickness_um / 2.0
-        off = abs(probe_z_um - line.z_um(along_um))
-        return min(along_um, line.reach_um - along_um, thick - off)
+        return min(along_um, line.reach_um - along_um, thick - abs(higher_um))
 
     def _note(self, pushes: tuple[Push, ...], on_jaws: Mapping[str, float]) -> None:
         """Tell when the probe comes to a fibre or a jaw, and the highest force once it has left."""
-        if not (pushes or self._peaks_un or any(on_jaws.values())):
-            return
         forces: dict[int | str, float] = {push.fibre: push.force_un for push in pushes}
-        forces |= {name: force for name, force in on_jaws.items() if force}
+        forces.update(on_jaws.items())
         along = {push.fibre: push.abscissa_um for push in pushes}
         for what, force in forces.items():
             if what not in self._peaks_un:
@@ -341,8 +396,10 @@ class Workspace:
     @property
     def restless_s(self) -> float:
         """For how long nothing changes that the probe feels, though all stages stand."""
-        held = self._gripper_contacts.held
-        return min((each.restless_s for each in held), default=math.inf)
+        restless_s = math.inf
+        for each in self._gripper_contacts.held:
+            restless_s = min(restless_s, each.restless_s)
+        return restless_s
 
     def _jaw(self, name: str, tool: Tool, probe: Point) -> float:
         """Return the force of a jaw's outer face on the probe's tip."""
@@ -360,9 +417,11 @@ class Workspace:
         travel = face - probe[1]
         touch = self._jaw_touches[name]
         if not touch.look(reach, travel):
-            self._nothing_before(max(-reach, -travel))
+            clear_um = max(-reach, -travel)
+            self._jaws_clear_um = min(self._jaws_clear_um, clear_um)
+            self._nothing_before(clear_um)
             return NOTHING
-        self._slack_um = 0.0
+        self._slack_um = self._jaws_clear_um = 0.0
         if travel < 0.0:
             touch.come_off()
             return NOTHING
