@@ -7,7 +7,7 @@ from cosmic.autonomy.handling.force import ForceWatch
 from cosmic.autonomy.handling.retrying_move import RetryingMove
 from cosmic.frame.errors import MoveCancelled
 
-LOOK_S: Final = 0.01
+LOOK_S: Final = 0.02
 
 
 class CarefulMove:
