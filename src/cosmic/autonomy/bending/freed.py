@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.autonomy.bending.crept import NOTHING_BEFORE, Loads
 from cosmic.autonomy.bending.result import Floats
 from cosmic.autonomy.bending.span import Span
 
@@ -24,7 +25,9 @@ LEAST_PART: Final = 0.1
 CLEAR_SIGMAS: Final = 5.0
 
 
-def freed_of(span: Span, baseline_un: Floats, relaxation_part: float) -> tuple[float, float]:
+def freed_of(
+    span: Span, baseline_un: Floats, relaxation_part: float, earlier: Loads = NOTHING_BEFORE
+) -> tuple[float, float]:
     """Return ln of the force after by that before, and its standard deviation; nan: unknown.
 
     Parameters
@@ -33,6 +36,8 @@ def freed_of(span: Span, baseline_un: Floats, relaxation_part: float) -> tuple[f
         At each point of the span.
     relaxation_part : float
         Part of the force that goes in a tenfold time: it fell by that meanwhile as well.
+    earlier : Loads
+        Of earlier spans, from which the fibre still comes back.
     """
     freed = span.freed
     if freed is None or not 0 <= freed.after < len(span.force_un):
@@ -46,6 +51,8 @@ def freed_of(span: Span, baseline_un: Floats, relaxation_part: float) -> tuple[f
     )
     if not (before > CLEAR_SIGMAS * noise and min(up, down) > LEAST_PART * before):
         return UNKNOWN
-    fell = relaxation_part * math.log10(1.0 + freed.wait_s / READ_S)
+    read_s = span.time_s[freed.after] + np.array([0.0, freed.wait_s])
+    came_back = float(np.diff(earlier.lost_un(read_s))[0]) / before
+    fell = relaxation_part * (math.log10(1.0 + freed.wait_s / READ_S) + came_back)
     after = 2.0 / (1.0 / up + 1.0 / down)
     return math.log(after / before) + fell, math.hypot(noise / before, 0.5 * fell)

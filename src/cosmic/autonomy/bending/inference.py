@@ -38,6 +38,12 @@ TWISTED: Final = 0.25
 """Of what friction does to a section askew: the part that differs between spans, by twist."""
 
 TWISTED_LEAST: Final = 0.03
+
+TURNED_PART: Final = 1.0
+TURNED_LEAST: Final = 0.1
+"""How far friction that holds a section askew may have turned round on the way back, as a part of
+what it did on the way out; and at least, of ln(k)."""
+
 ALONG: Final = ("friction along, once it let go", "")
 
 LEAST_STD: Final = 0.004
@@ -182,7 +188,7 @@ def readings_of(
         to_common[:, [FRICTION, SHEAR]] = 0.0
     same = span[:, None] == span[None, :]
     own = (*_own(response, span, settings, direction), shear)
-    freed = None if glass else _freed(fits, rows, settings)
+    freed = None if glass else _freed(fits, rows)
     if glass:
         own = (*own[1:], ("friction", "", friction, 0.0, settings.friction_std))
     if freed is not None:
@@ -250,9 +256,7 @@ def _askew(sign: Floats, same: np.ndarray, settings: FitSettings) -> Floats:
     return np.asarray(each * np.outer(sign, sign))
 
 
-def _freed(
-    fits: Sequence[SpanFit], rows: Sequence["_Row"], settings: FitSettings
-) -> tuple[Floats, Floats] | None:
+def _freed(fits: Sequence[SpanFit], rows: Sequence["_Row"]) -> tuple[Floats, Floats] | None:
     """Return what is to be added to ln(k), and its covariance; None: friction never let go.
 
     On the way out a section askew was as much too stiff as the force fell once friction let go;
@@ -273,7 +277,8 @@ def _freed(
     out = np.array([each.sign > 0.0 for each in rows])
     of_out = np.diag(stds[span] ** 2) * np.outer(out, out)
     same = span[:, None] == span[None, :]
-    back = np.outer(~out, ~out) * settings.askew_std**2 * (1.0 + same)
+    turned = np.where(out, 0.0, np.hypot(TURNED_PART * logs, TURNED_LEAST)[span])
+    back = np.outer(turned, turned) * (0.5 + 0.5 * same)
     return logs[span] * out, np.asarray(of_out + back)
 
 

@@ -84,7 +84,7 @@ class FitSettings(StrictModel):
     fibre_width_um: float = Field(30.0, ge=0.0)
     direction_std_deg: float = Field(1.0, ge=0.0)
     touch_std_um: float = Field(0.5, gt=0.0)
-    friction: float = Field(0.3, ge=0.0, lt=1.0)
+    friction: float = Field(0.2, ge=0.0, lt=1.0)
     friction_std: float = Field(0.15, ge=0.0)
     askew_std: float = Field(0.2, ge=0.0, lt=1.0)
     cross_std_part: float = Field(0.02, ge=0.0)

@@ -23,6 +23,7 @@ from cosmic.autonomy.bending.branch import (
     touched,
 )
 from cosmic.autonomy.bending.branch import stuck as clings
+from cosmic.autonomy.bending.crept import Loads, lost
 from cosmic.autonomy.bending.curved import NaturalShape, OutAndBack, PushedCurve, curves_of
 from cosmic.autonomy.bending.freed import freed_of
 from cosmic.autonomy.bending.response import straight
@@ -49,7 +50,6 @@ TYPICAL_PART: Final = 0.6
 """Of the stroke: where curves are compared."""
 
 TURNING_PART: Final = 0.1
-RELAXED_AT_S: Final = 1.0
 SLIPPED_PART: Final = 0.03
 """Of stroke and highest force: less does no harm."""
 
@@ -101,6 +101,11 @@ class _Pushed:
         first = rough(points, points.loading, points.free_force_un)
         return cls(points, shape, first, shape.lever_um(settings.offset_um))
 
+    @property
+    def loads(self) -> Loads:
+        """What the fibre bears in it, for the spans after it."""
+        return Loads.of(self.points.time_s, self.points.force_un - self.points.free_force_un)
+
     def gives_um3(self, settings: FitSettings) -> tuple[float, float]:
         """Return how far the probe gives way along the fibre, and one that does not."""
         ei_un_um2 = max(self.first.k_un_um, 0.0) * self.lever_um**3 / 3.0
@@ -116,6 +121,7 @@ class _Model:
         settings: FitSettings,
         friction: float,
         curves: tuple[OutAndBack, ...],
+        before: Loads,
     ) -> None:
         points = self._points = pushed.points
         self._settings, self._friction = settings, friction
@@ -125,7 +131,8 @@ class _Model:
         )
         self.curves, self.stiff_probe = curves
         self._elapsed_s = points.time_s - points.time_s[0]
-        self._lost = _lost(points.time_s)
+        self._lost, self.before = lost(points.time_s), before
+        self._lost_before_un = before.lost_un(points.time_s)
         # A way back that never touches says where the baseline is, and nothing of the fibre.
         clear = clear_points(points, ~points.loading)
         self.branches = [points.loading, ~points.loading] if clear else [points.loading]
@@ -138,7 +145,10 @@ class _Model:
             log_k, hinge_um = values[2 * number], values[2 * number + 1]
             ahead = self._points.probe_um[branch] - hinge_um
             force[branch] = self._force(ahead, log_k, self.curves[number])
-        return np.asarray(force - values[-1] * (self._lost @ force))
+        # What has crept stands back from the probe: it is left sooner, and never pulls.
+        lost_un = self._lost @ force + self._lost_before_un
+        left_un = np.maximum(force - values[-1] * lost_un, 0.0)
+        return np.asarray(np.where(force > 0.0, left_un, 0.0))
 
     def _force(self, ahead_um: Floats, log_k: float, curve: PushedCurve) -> Floats:
         return curve.force_un(
@@ -162,8 +172,11 @@ class _Model:
             force[branch] = here
             by_value[2 * number, branch] = (stiffer - here) / TINY
             by_value[2 * number + 1, branch] = (there - here) / TINY
+        lost_un = self._lost @ force + self._lost_before_un
         by_value[:count] -= values[-1] * (by_value[:count] @ self._lost.T)
-        by_value[-3], by_value[-2], by_value[-1] = 1.0, self._elapsed_s, -(self._lost @ force)
+        by_value[-1] = -lost_un
+        by_value *= (force > values[-1] * lost_un) & (force > 0.0)
+        by_value[-3], by_value[-2] = 1.0, self._elapsed_s
         return by_value.T
 
     def total(self, values: Floats) -> Floats:
@@ -283,18 +296,6 @@ class _Model:
         return _Found(values, covariance, chi2, freedom)
 
 
-def _lost(time_s: Floats) -> Floats:
-    """Return what is lost at each time of the force at each, for a part of 1 in a tenfold time.
-
-    Each step of the force counts from `RELAXED_AT_S` after it: stiffness is what a fibre shows
-    then.
-    """
-    middles = time_s - 0.5 * np.diff(time_s, prepend=2.0 * time_s[0] - time_s[1])
-    since = (time_s[:, None] - middles[None, :]) / RELAXED_AT_S
-    of_steps = np.where(since > 0.0, np.log10(np.maximum(since, 1e-3)), 0.0)
-    return np.asarray(-np.diff(of_steps, append=0.0))
-
-
 def fit_spans(
     spans: Sequence[Span],
     *,
@@ -331,10 +332,12 @@ def fit_spans(
         radius_um=settings.radius_um,
         friction=rub,
     )
-    models = {
-        number: _Model(each, settings, rub, laid)
-        for (number, each), laid in zip(pushed.items(), curves, strict=True)
-    }
+    models: dict[int, _Model] = {}
+    pushes: list[tuple[Loads, float]] = []
+    for (number, each), laid in zip(pushed.items(), curves, strict=True):
+        before = Loads.before(pushes, each.lever_um)
+        models[number] = _Model(each, settings, rub, laid, before)
+        pushes.append((each.loads, each.lever_um))
     return tuple(
         _fitted(span, points, models.get(number), settings, place_um)
         for number, (span, points, place_um) in enumerate(
@@ -414,7 +417,8 @@ def _span_result(
     baseline = model.baseline(values)
     fitted = np.full(len(span.probe_um), math.nan)
     fitted[points.kept] = model.total(values)
-    freed = freed_of(span, values[-3] + values[-2] * (span.time_s - points.time_s[0]), values[-1])
+    baseline_un = values[-3] + values[-2] * (span.time_s - points.time_s[0])
+    freed = freed_of(span, baseline_un, values[-1], model.before)
     out, back = (values[:2], values[2:4]) if both else (values[:2], (math.nan, math.nan))
     stds = np.sqrt(np.diag(covariance))
     shift = covariance[1, 1] + covariance[3, 3] - 2.0 * covariance[1, 3] if both else math.nan
