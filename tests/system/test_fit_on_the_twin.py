@@ -152,6 +152,19 @@ def test_what_creeps_is_as_stiff_as_it_shows_one_second_after_a_step() -> None:
     assert result.ei_n_m2 == pytest.approx(true, rel=0.025)
 
 
+def test_what_creeps_relaxes_alike_at_each_span_and_as_much_after_earlier_pushes() -> None:
+    fits = [
+        measured(settings(FIBRE.model_copy(update={"relaxation_per_decade": part})), 0, {})[0].spans
+        for part in (0.0, 0.03)
+    ]
+    plain, creeps = fits
+    assert [fit.relaxation_part for fit in creeps] == pytest.approx([0.028] * len(creeps), abs=0.01)
+    assert all(fit.chi2 < 1.2 * fit.freedom for fit in creeps), "nothing is left to explain"
+    # The same noise in both: what a slide shows is not mistaken for what creeps.
+    for one, other in zip(plain, creeps, strict=True):
+        assert other.freed_log == pytest.approx(one.freed_log, abs=0.02)
+
+
 def test_with_all_effects_of_the_realistic_world_the_truth_is_inside() -> None:
     realistic = load_world("realistic", ROOT / "config").session
     felt = {key: each for key, each in realistic.items() if not key.startswith(NOT_FELT)}

@@ -6,8 +6,14 @@ import math
 import numpy as np
 import pytest
 
-from cosmic.autonomy.bending.fit import fit_bending, half_width_percent
+from cosmic.autonomy.bending.fit import (
+    assess_campaign,
+    fit_bending,
+    half_width_percent,
+    measure_fibre,
+)
 from cosmic.autonomy.bending.freed import freed_of
+from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Freed, Span
 from unit.autonomy.bending.test_fit_bending import pushed, rig
 
@@ -70,3 +76,17 @@ def test_what_relaxed_meanwhile_is_not_taken_for_friction() -> None:
     log, std = freed_of(slid, np.full(len(span.probe_um), LEVEL_UN), 0.05)
     assert log == pytest.approx(0.0, abs=0.003)
     assert std > 0.02, "how fast it relaxed just then is not well known"
+
+
+def test_where_nothing_holds_the_section_both_ways_tell_that_nothing_rubs() -> None:
+    settings = FitSettings()
+    fibres = []
+    for seed in range(6):
+        spans = []
+        for span in pushed(rig(seed)):
+            as_before = span.force_un[[AFTER]]
+            freed = Freed(AFTER, as_before, as_before, 0.03, 0.2)
+            spans.append(dataclasses.replace(span, freed=freed))
+        fibres.append(measure_fibre(spans, settings=settings))
+    found = assess_campaign(fibres, standards=[], settings=settings)
+    assert found.friction < 0.9 * settings.friction
