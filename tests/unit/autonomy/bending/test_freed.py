@@ -78,7 +78,7 @@ def test_what_relaxed_meanwhile_is_not_taken_for_friction() -> None:
     assert std > 0.02, "how fast it relaxed just then is not well known"
 
 
-def test_where_nothing_holds_the_section_both_ways_tell_that_nothing_rubs() -> None:
+def test_the_friction_is_small_where_both_branches_agree_and_no_slide_lets_go() -> None:
     settings = FitSettings()
     fibres = []
     for seed in range(6):
