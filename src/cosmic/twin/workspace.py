@@ -232,7 +232,8 @@ class Workspace:
                 on_jaws[name] = force
         if pushes or on_jaws or self._peaks_un:
             self._note(pushes, on_jaws)
-        if grippers.idle and self._jaws_clear_um > self._slack_um:
+        steady = self.offsets.fastest_um_s is not None
+        if steady and grippers.idle and self._jaws_clear_um > self._slack_um:
             self._clear.begin(values, time_s, self._jaws_clear_um)
         else:
             self._clear.end()

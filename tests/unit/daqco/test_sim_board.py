@@ -2,16 +2,18 @@
 
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from typing_extensions import override
 
+from cosmic.daqco.hw.board_group import BoardGroup
 from cosmic.daqco.hw.interface import BoardChunk, InputMode, InputSettings
 from cosmic.daqco.hw.sim_board import SimulatedBoard
 from cosmic.daqco.hw.sim_fast import FastLibrary
-from cosmic.daqco.hw.sim_library import SimulatedLibrary
+from cosmic.daqco.hw.sim_library import PCI_6229, SimulatedLibrary
 from cosmic.frame.clock import ManualClock, RatedClock
 from cosmic.frame.errors import (
     ConfigError,
@@ -158,18 +160,23 @@ def test_an_open_input_carries_some_millivolts_of_noise_and_hum() -> None:
 
 
 def test_the_same_seed_gives_the_same_samples_whatever_is_waited_for() -> None:
-    def read(waits_s: Sequence[float]) -> Array:
+    def read(waits: int) -> tuple[Array, set[int]]:
         clock = RatedClock(50.0)
         board = SimulatedLibrary(clock, {("Dev1", "ai0"): Level(1.0)}, seed=5).open("Dev1")
-        board.configure(inputs(1), 1000.0, 300)
+        board.configure(inputs(1), 1000.0, 600)
         board.start()
-        for each in waits_s:
-            clock.expect(each)
-        volts = np.concatenate([each.volts for each in chunks(board, 6)], axis=1)
+        pieces: list[Array] = []
+        while sum(each.shape[1] for each in pieces) < 1800:
+            if len(pieces) < waits:
+                clock.expect(clock.now_s() + 0.1)
+            pieces.append(chunks(board, 1)[0].volts)
         board.close()
-        return volts[:, :600]
+        return np.concatenate(pieces, axis=1)[:, :1800], {each.shape[1] for each in pieces}
 
-    assert np.array_equal(read([]), read([0.1, 0.35, 0.36]))
+    whole, shorter = read(0), read(4)
+    assert whole[1] == {600}
+    assert min(shorter[1]) < 600, "somebody did wait"
+    assert np.array_equal(whole[0], shorter[0])
 
 
 def test_the_same_seed_gives_the_same_samples_whatever_the_chunks() -> None:
@@ -299,7 +306,33 @@ def test_the_pieces_of_boards_that_are_waited_for_end_at_the_same_samples() -> N
 
 def test_a_clock_that_hurries_nobody_leaves_all_pieces_whole() -> None:
     assert RatedClock(1.0).expectations is None
-    assert ManualClock().expectations is None
+    clock = stepping()
+    board = SimulatedLibrary(clock).open("Dev1")
+    for chunk in (100, 500):
+        board.configure(inputs(1), 1000.0, chunk)
+        board.start()
+        clock.expect(clock.now_s() + 0.02)
+        assert [each.volts.shape[1] for each in chunks(board, 3)] == [chunk] * 3
+        board.stop()
+
+
+def test_boards_of_two_drivers_are_waited_for_without_losing_step() -> None:
+    clock = RatedClock(20.0)
+    make = replace(PCI_6229, name="T", product="T7")
+    libraries = [SimulatedLibrary(clock), SimulatedLibrary(clock, info=make)]
+    group = BoardGroup([libraries[0].open("Dev1"), libraries[1].open("T1")])
+    group.configure({"Dev1": inputs(1), "T1": inputs(1)}, 1000.0, 100)
+    group.start()
+    after, short = 0, 0
+    for _ in range(60):
+        clock.expect(clock.now_s() + 0.031)
+        joined = group.receive(2.0)
+        assert joined is not None
+        assert joined.first_sample == after, "nothing is lost or twice"
+        after += joined.volts.shape[1]
+        short += joined.volts.shape[1] < 100
+    assert short > 10
+    group.stop()
 
 
 # --- trouble ----------------------------------------------------------------------------------

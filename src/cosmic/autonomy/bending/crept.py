@@ -38,14 +38,21 @@ class Loads:
         return cls(_middles_s(time_s), np.diff(force_un, prepend=0.0))
 
     @classmethod
-    def before(cls, pushes: Sequence[tuple["Loads", float]], lever_um: float) -> "Loads":
-        """Return what earlier pushes, each with its lever, are at another lever.
+    def of_push(cls, time_s: Floats, force_un: Floats) -> "Loads":
+        """Return the steps of a whole push; after its last reading the probe is off."""
+        steps = cls.of(time_s, force_un)
+        off = np.append(steps.step_un, -steps.step_un.sum())
+        return cls(np.append(steps.time_s, time_s[-1]), off)
+
+    @classmethod
+    def elsewhere(cls, pushes: Sequence[tuple["Loads", float]], lever_um: float) -> "Loads":
+        """Return what other pushes, each with its lever, are at this one.
 
         A force bends each cell of the fibre by its own lever; where the probe stands now, that
         force would have gone as far as this one.
         """
         if not pushes:
-            return NOTHING_BEFORE
+            return NO_LOADS
         steps = [each.step_un * _as_much_at(lever_um, there_um) for each, there_um in pushes]
         return cls(np.concatenate([each.time_s for each, _ in pushes]), np.concatenate(steps))
 
@@ -54,7 +61,7 @@ class Loads:
         return np.asarray(_decades(time_s, self.time_s) @ self.step_un)
 
 
-NOTHING_BEFORE: Final = Loads(np.zeros(0), np.zeros(0))
+NO_LOADS: Final = Loads(np.zeros(0), np.zeros(0))
 
 
 def lost(time_s: Floats) -> Floats:

@@ -73,7 +73,7 @@ class Certificate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredFibre:
-    """One fibre, each span by itself: what a campaign keeps for its fit.
+    """One fibre, span by span: what a campaign keeps for its fit.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ def measure_fibre(
     friction: float | None = None,
     known: Response | None = None,
 ) -> MeasuredFibre:
-    """Return what each span of a fibre, or of a standard, says by itself.
+    """Return what the spans of a fibre, or of a standard, say one by one.
 
     Parameters
     ----------

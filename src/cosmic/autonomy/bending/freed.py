@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from cosmic.autonomy.bending.crept import NOTHING_BEFORE, Loads
+from cosmic.autonomy.bending.crept import NO_LOADS, Loads
 from cosmic.autonomy.bending.result import Floats
 from cosmic.autonomy.bending.span import Span
 
@@ -26,7 +26,7 @@ CLEAR_SIGMAS: Final = 5.0
 
 
 def freed_of(
-    span: Span, baseline_un: Floats, relaxation_part: float, earlier: Loads = NOTHING_BEFORE
+    span: Span, baseline_un: Floats, relaxation_part: float, elsewhere: Loads = NO_LOADS
 ) -> tuple[float, float]:
     """Return ln of the force after by that before, and its standard deviation; nan: unknown.
 
@@ -36,8 +36,8 @@ def freed_of(
         At each point of the span.
     relaxation_part : float
         Part of the force that goes in a tenfold time: it fell by that meanwhile as well.
-    earlier : Loads
-        Of earlier spans, from which the fibre still comes back.
+    elsewhere : Loads
+        Of other spans, from which the fibre still comes back.
     """
     freed = span.freed
     if freed is None or not 0 <= freed.after < len(span.force_un):
@@ -52,7 +52,8 @@ def freed_of(
     if not (before > CLEAR_SIGMAS * noise and min(up, down) > LEAST_PART * before):
         return UNKNOWN
     read_s = span.time_s[freed.after] + np.array([0.0, freed.wait_s])
-    came_back = float(np.diff(earlier.lost_un(read_s))[0]) / before
-    fell = relaxation_part * (math.log10(1.0 + freed.wait_s / READ_S) + came_back)
+    fell = relaxation_part * math.log10(1.0 + freed.wait_s / READ_S)
+    came_back = relaxation_part * float(-np.diff(elsewhere.lost_un(read_s))[0]) / before
     after = 2.0 / (1.0 / up + 1.0 / down)
-    return math.log(after / before) + fell, math.hypot(noise / before, 0.5 * fell)
+    std = math.hypot(noise / before, 0.5 * fell, 0.5 * came_back)
+    return math.log(after / before) + fell - came_back, std

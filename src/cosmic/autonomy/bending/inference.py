@@ -260,8 +260,8 @@ def _freed(fits: Sequence[SpanFit], rows: Sequence["_Row"]) -> tuple[Floats, Flo
     """Return what is to be added to ln(k), and its covariance; None: friction never let go.
 
     On the way out a section askew was as much too stiff as the force fell once friction let go;
-    where that was not tried, as much as in the other spans, but for twist. Of the way back nothing
-    is known: how far friction has turned round there depends on the section.
+    where that was not tried, as much as in the other spans, but for twist. On the way back it may
+    have turned round, by any part of that: how far depends on the section.
     """
     logs = np.array([each.freed_log for each in fits])
     stds = np.array([each.freed_std_part for each in fits])
@@ -514,7 +514,7 @@ def _quantile(weights: Floats, means: Floats, stds: Floats, part: float) -> floa
     def more(value: float) -> float:
         return float((weights * ndtr((value - means) / stds)).sum()) - part
 
-    if not low < high:
+    if not low < high or not (np.isfinite(weights).all() and np.isfinite(stds).all()):
         return 0.5 * (low + high)
     return float(brentq(more, low, high, xtol=EXACT, rtol=EXACT, maxiter=MOST_TRIES))
 

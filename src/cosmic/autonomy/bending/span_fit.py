@@ -1,4 +1,4 @@
-"""The model of a pushed cantilever, fitted to spans, each by itself."""
+"""The model of a pushed cantilever, fitted to spans one by one; each remembers the others."""
 
 import math
 from collections.abc import Sequence
@@ -95,16 +95,18 @@ class _Pushed:
     shape: NaturalShape
     first: Rough
     lever_um: float
+    loads: Loads
+    """What the fibre bears in it, whatever of that is of no use for its own fit."""
 
     @classmethod
-    def of(cls, points: Points, shape: NaturalShape, settings: FitSettings) -> "_Pushed":
+    def of(
+        cls, span: Span, points: Points, shape: NaturalShape, settings: FitSettings
+    ) -> "_Pushed":
         first = rough(points, points.loading, points.free_force_un)
-        return cls(points, shape, first, shape.lever_um(settings.offset_um))
-
-    @property
-    def loads(self) -> Loads:
-        """What the fibre bears in it, for the spans after it."""
-        return Loads.of(self.points.time_s, self.points.force_un - self.points.free_force_un)
+        every = points_of(span)
+        free_un = np.interp(every.time_s, points.time_s, points.free_force_un)
+        loads = Loads.of_push(every.time_s, np.maximum(every.force_un - free_un, 0.0))
+        return cls(points, shape, first, shape.lever_um(settings.offset_um), loads)
 
     def gives_um3(self, settings: FitSettings) -> tuple[float, float]:
         """Return how far the probe gives way along the fibre, and one that does not."""
@@ -121,7 +123,7 @@ class _Model:
         settings: FitSettings,
         friction: float,
         curves: tuple[OutAndBack, ...],
-        before: Loads,
+        elsewhere: Loads,
     ) -> None:
         points = self._points = pushed.points
         self._settings, self._friction = settings, friction
@@ -131,8 +133,8 @@ class _Model:
         )
         self.curves, self.stiff_probe = curves
         self._elapsed_s = points.time_s - points.time_s[0]
-        self._lost, self.before = lost(points.time_s), before
-        self._lost_before_un = before.lost_un(points.time_s)
+        self._lost, self.elsewhere = lost(points.time_s), elsewhere
+        self._lost_elsewhere_un = elsewhere.lost_un(points.time_s)
         # A way back that never touches says where the baseline is, and nothing of the fibre.
         clear = clear_points(points, ~points.loading)
         self.branches = [points.loading, ~points.loading] if clear else [points.loading]
@@ -146,7 +148,7 @@ class _Model:
             ahead = self._points.probe_um[branch] - hinge_um
             force[branch] = self._force(ahead, log_k, self.curves[number])
         # What has crept stands back from the probe: it is left sooner, and never pulls.
-        lost_un = self._lost @ force + self._lost_before_un
+        lost_un = self._lost @ force + self._lost_elsewhere_un
         left_un = np.maximum(force - values[-1] * lost_un, 0.0)
         return np.asarray(np.where(force > 0.0, left_un, 0.0))
 
@@ -172,7 +174,7 @@ class _Model:
             force[branch] = here
             by_value[2 * number, branch] = (stiffer - here) / TINY
             by_value[2 * number + 1, branch] = (there - here) / TINY
-        lost_un = self._lost @ force + self._lost_before_un
+        lost_un = self._lost @ force + self._lost_elsewhere_un
         by_value[:count] -= values[-1] * (by_value[:count] @ self._lost.T)
         by_value[-1] = -lost_un
         by_value *= (force > values[-1] * lost_un) & (force > 0.0)
@@ -303,7 +305,7 @@ def fit_spans(
     places_um: Sequence[float],
     friction: float | None = None,
 ) -> tuple[SpanFit, ...]:
-    """Fit spans, each by itself.
+    """Fit the spans of one grasp, one by one: the fibre comes back from the others meanwhile.
 
     Parameters
     ----------
@@ -319,7 +321,7 @@ def fit_spans(
     """
     usable = [_usable(span, settings) for span in spans]
     pushed = {
-        number: _Pushed.of(points, span.shape or straight(place_um), settings)
+        number: _Pushed.of(span, points, span.shape or straight(place_um), settings)
         for number, (span, points, place_um) in enumerate(
             zip(spans, usable, places_um, strict=True)
         )
@@ -332,12 +334,19 @@ def fit_spans(
         radius_um=settings.radius_um,
         friction=rub,
     )
-    models: dict[int, _Model] = {}
-    pushes: list[tuple[Loads, float]] = []
-    for (number, each), laid in zip(pushed.items(), curves, strict=True):
-        before = Loads.before(pushes, each.lever_um)
-        models[number] = _Model(each, settings, rub, laid, before)
-        pushes.append((each.loads, each.lever_um))
+    models = {
+        number: _Model(
+            each,
+            settings,
+            rub,
+            laid,
+            Loads.elsewhere(
+                [(one.loads, one.lever_um) for one in pushed.values() if one is not each],
+                each.lever_um,
+            ),
+        )
+        for (number, each), laid in zip(pushed.items(), curves, strict=True)
+    }
     return tuple(
         _fitted(span, points, models.get(number), settings, place_um)
         for number, (span, points, place_um) in enumerate(
@@ -418,7 +427,7 @@ def _span_result(
     fitted = np.full(len(span.probe_um), math.nan)
     fitted[points.kept] = model.total(values)
     baseline_un = values[-3] + values[-2] * (span.time_s - points.time_s[0])
-    freed = freed_of(span, baseline_un, values[-1], model.before)
+    freed = freed_of(span, baseline_un, values[-1], model.elsewhere)
     out, back = (values[:2], values[2:4]) if both else (values[:2], (math.nan, math.nan))
     stds = np.sqrt(np.diag(covariance))
     shift = covariance[1, 1] + covariance[3, 3] - 2.0 * covariance[1, 3] if both else math.nan

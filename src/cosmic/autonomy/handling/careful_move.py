@@ -1,5 +1,6 @@
 """A movement of the probe that ends where it feels more than it should."""
 
+import math
 from collections.abc import Callable
 from typing import Final
 
@@ -34,12 +35,16 @@ class CarefulMove:
         self._movement = movement
         self._forces = forces
         self._low_un, self._high_un = low_un, high_un
+        self._next_s = -math.inf
         self._leave = forces.subscribe(self._look)
         self._expect()
 
     def _expect(self) -> None:
         clock = self._forces.clock
-        clock.expect(clock.now_s() + LOOK_S)
+        now_s = clock.now_s()
+        if now_s >= self._next_s:
+            self._next_s = now_s + LOOK_S
+            clock.expect(self._next_s)
 
     def _look(self) -> None:
         """Look at the newest samples; in the thread of the acquisition."""

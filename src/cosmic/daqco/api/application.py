@@ -340,7 +340,7 @@ class DaqcoApplication(TaskApplication):
             self._check_hung()
             settings = self._settings
             # However fast a simulation runs, on the wall there are no more than were asked for, or
-            # it would do nothing else; but who waits for samples waits for their chunk.
+            # it would do nothing else; who waits for samples has a chunk end there.
             longer_s = min(LONGER * self.clock.rate * settings.chunk_s, LONGEST_CHUNK_S)
             chunk_s = max(settings.chunk_s, longer_s)
             plan = make_plan(

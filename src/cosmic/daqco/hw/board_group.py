@@ -72,6 +72,7 @@ class BoardGroup:
         self._clocked = frozenset(clocked)
         self._pieces: dict[int, BoardChunk] = {}
         self._shapes: list[tuple[int, int]] = []
+        self._rate_hz = 0.0
         self._drift_ppm = 2.0 * clock_ppm
         self._agreement: tuple[ClockAgreement, ...] = ()
         self._calls = 0
@@ -116,6 +117,7 @@ class BoardGroup:
                 f"such as 1000 Hz",
                 fault=DeviceFault.PARAMETER,
             )
+        self._rate_hz = rates[0]
         return rates[0]
 
     def start(self) -> None:
@@ -153,8 +155,7 @@ class BoardGroup:
                         self._pieces[number] = piece
             if len(self._pieces) < len(self._boards):
                 return None
-            pieces, self._pieces = self._pieces, {}
-            return self._joined([pieces[number] for number in range(len(self._boards))])
+            return self._joined(self._whole_pieces())
         except DeviceError:
             self.stop()
             raise
@@ -174,6 +175,22 @@ class BoardGroup:
                     f"a chunk of shape {piece.volts.shape} came instead of {self._shapes[number]}"
                 )
             return piece
+
+    def _whole_pieces(self) -> list[BoardChunk]:
+        """Return as much of all boards as there is of each, and keep the rest for the next call."""
+        pieces = [self._pieces[number] for number in range(len(self._boards))]
+        count = min(each.volts.shape[1] for each in pieces)
+        self._pieces = {
+            number: self._part(each, slice(count, None))
+            for number, each in enumerate(pieces)
+            if each.volts.shape[1] > count
+        }
+        return [self._part(each, slice(count)) for each in pieces] if self._pieces else pieces
+
+    def _part(self, piece: BoardChunk, samples: slice) -> BoardChunk:
+        begin = samples.start or 0
+        time_s = piece.time_s + begin / self._rate_hz
+        return BoardChunk(piece.first_sample + begin, time_s, piece.volts[:, samples])
 
     def _fits(self, volts: Volts, number: int) -> bool:
         """Tell whether a chunk is what was asked for; of a simulated board it may be shorter."""
@@ -199,12 +216,6 @@ class BoardGroup:
                 raise OverrunError(
                     f"{board.info.name} is not in step with {self._boards[0].info.name}: its "
                     f"sample {piece.first_sample} arrived with sample {first.first_sample}; "
-                    f"start again"
-                )
-            if piece.volts.shape[1] != first.volts.shape[1]:
-                raise OverrunError(
-                    f"{board.info.name} is not in step with {self._boards[0].info.name}: "
-                    f"{piece.volts.shape[1]} samples arrived with {first.volts.shape[1]}; "
                     f"start again"
                 )
         if not first.first_sample:

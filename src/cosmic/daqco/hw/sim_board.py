@@ -195,6 +195,7 @@ class SimulatedBoard(Board):
         with self._faults.changed:
             if self._run is not None:
                 raise self._error("start: it is acquiring already", DeviceFault.STATE)
+            self._pieces.first = -1
             start_s = math.inf if self._start_trigger else self._clock.now_s()
             run = _Run(self._setup, start_s, self._clock.horizon())
             run.horizon.move_to(self._horizon_s(self._due_s(run)))
@@ -304,9 +305,9 @@ class SimulatedBoard(Board):
             self._leave_expected = expectations.added.subscribe(self._expected)
 
     def _expected(self, time_s: float) -> None:
-        run = self._run
-        if run is not None and time_s < run.time_s(run.due_sample):
-            with self._faults.changed:
+        with self._faults.changed:
+            run = self._run
+            if run is not None and time_s < run.time_s(run.due_sample):
                 self._faults.changed.notify_all()
 
     def _horizon_s(self, due_s: float) -> float:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from cosmic.autonomy.bending.crept import NOTHING_BEFORE, Loads, lost
+from cosmic.autonomy.bending.crept import NO_LOADS, Loads, lost
 
 
 def test_a_step_loses_its_part_in_each_tenfold_time_from_one_second_on() -> None:
@@ -45,10 +45,17 @@ def test_a_force_at_another_lever_counts_by_its_deflection_at_this_one(
     bend = np.maximum(there_um - cells, 0.0)
     bent = float((bend * np.maximum(here_um - cells, 0.0)).sum()) * 600.0 / 20_000
     as_much = 3.0 * bent / here_um**3
-    (step,) = Loads.before([(Loads(np.zeros(1), np.ones(1)), there_um)], here_um).step_un
+    (step,) = Loads.elsewhere([(Loads(np.zeros(1), np.ones(1)), there_um)], here_um).step_un
     assert step == pytest.approx(as_much, rel=1e-4)
 
 
-def test_nothing_before_loses_nothing() -> None:
-    assert Loads.before([], 300.0) is NOTHING_BEFORE
-    assert NOTHING_BEFORE.lost_un(np.array([1.0, 2.0])) == pytest.approx([0.0, 0.0])
+def test_without_loads_nothing_is_lost() -> None:
+    assert Loads.elsewhere([], 300.0) is NO_LOADS
+    assert NO_LOADS.lost_un(np.array([1.0, 2.0])) == pytest.approx([0.0, 0.0])
+
+
+def test_after_the_last_reading_of_a_push_nothing_is_left_on_the_fibre() -> None:
+    cut_off = Loads.of_push(np.array([0.0, 1.0, 2.0]), np.array([0.0, 30.0, 26.0]))
+    assert cut_off.step_un.sum() == pytest.approx(0.0)
+    late = cut_off.lost_un(np.array([100.0, 1000.0]))
+    assert abs(late[1]) < abs(late[0]) < 1.0
