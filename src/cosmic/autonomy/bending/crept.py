@@ -45,7 +45,7 @@ class Loads:
         return cls(np.append(steps.time_s, time_s[-1]), off)
 
     @classmethod
-    def elsewhere(cls, pushes: Sequence[tuple["Loads", float]], lever_um: float) -> "Loads":
+    def of_others(cls, pushes: Sequence[tuple["Loads", float]], lever_um: float) -> "Loads":
         """Return what other pushes, each with its lever, are at this one.
 
         A force bends each cell of the fibre by its own lever; where the probe stands now, that

@@ -26,7 +26,7 @@ CLEAR_SIGMAS: Final = 5.0
 
 
 def freed_of(
-    span: Span, baseline_un: Floats, relaxation_part: float, elsewhere: Loads = NO_LOADS
+    span: Span, baseline_un: Floats, relaxation_part: float, others: Loads = NO_LOADS
 ) -> tuple[float, float]:
     """Return ln of the force after by that before, and its standard deviation; nan: unknown.
 
@@ -36,7 +36,7 @@ def freed_of(
         At each point of the span.
     relaxation_part : float
         Part of the force that goes in a tenfold time: it fell by that meanwhile as well.
-    elsewhere : Loads
+    others : Loads
         Of other spans, from which the fibre still comes back.
     """
     freed = span.freed
@@ -53,7 +53,7 @@ def freed_of(
         return UNKNOWN
     read_s = span.time_s[freed.after] + np.array([0.0, freed.wait_s])
     fell = relaxation_part * math.log10(1.0 + freed.wait_s / READ_S)
-    came_back = relaxation_part * float(-np.diff(elsewhere.lost_un(read_s))[0]) / before
+    came_back = relaxation_part * float(-np.diff(others.lost_un(read_s))[0]) / before
     after = 2.0 / (1.0 / up + 1.0 / down)
     std = math.hypot(noise / before, 0.5 * fell, 0.5 * came_back)
     return math.log(after / before) + fell - came_back, std

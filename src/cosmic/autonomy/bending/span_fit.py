@@ -123,7 +123,7 @@ class _Model:
         settings: FitSettings,
         friction: float,
         curves: tuple[OutAndBack, ...],
-        elsewhere: Loads,
+        others: Loads,
     ) -> None:
         points = self._points = pushed.points
         self._settings, self._friction = settings, friction
@@ -133,8 +133,8 @@ class _Model:
         )
         self.curves, self.stiff_probe = curves
         self._elapsed_s = points.time_s - points.time_s[0]
-        self._lost, self.elsewhere = lost(points.time_s), elsewhere
-        self._lost_elsewhere_un = elsewhere.lost_un(points.time_s)
+        self._lost, self.others = lost(points.time_s), others
+        self._lost_to_others_un = others.lost_un(points.time_s)
         # A way back that never touches says where the baseline is, and nothing of the fibre.
         clear = clear_points(points, ~points.loading)
         self.branches = [points.loading, ~points.loading] if clear else [points.loading]
@@ -148,7 +148,7 @@ class _Model:
             ahead = self._points.probe_um[branch] - hinge_um
             force[branch] = self._force(ahead, log_k, self.curves[number])
         # What has crept stands back from the probe: it is left sooner, and never pulls.
-        lost_un = self._lost @ force + self._lost_elsewhere_un
+        lost_un = self._lost @ force + self._lost_to_others_un
         left_un = np.maximum(force - values[-1] * lost_un, 0.0)
         return np.asarray(np.where(force > 0.0, left_un, 0.0))
 
@@ -174,7 +174,7 @@ class _Model:
             force[branch] = here
             by_value[2 * number, branch] = (stiffer - here) / TINY
             by_value[2 * number + 1, branch] = (there - here) / TINY
-        lost_un = self._lost @ force + self._lost_elsewhere_un
+        lost_un = self._lost @ force + self._lost_to_others_un
         by_value[:count] -= values[-1] * (by_value[:count] @ self._lost.T)
         by_value[-1] = -lost_un
         by_value *= (force > values[-1] * lost_un) & (force > 0.0)
@@ -340,7 +340,7 @@ def fit_spans(
             settings,
             rub,
             laid,
-            Loads.elsewhere(
+            Loads.of_others(
                 [(one.loads, one.lever_um) for one in pushed.values() if one is not each],
                 each.lever_um,
             ),
@@ -427,7 +427,7 @@ def _span_result(
     fitted = np.full(len(span.probe_um), math.nan)
     fitted[points.kept] = model.total(values)
     baseline_un = values[-3] + values[-2] * (span.time_s - points.time_s[0])
-    freed = freed_of(span, baseline_un, values[-1], model.elsewhere)
+    freed = freed_of(span, baseline_un, values[-1], model.others)
     out, back = (values[:2], values[2:4]) if both else (values[:2], (math.nan, math.nan))
     stds = np.sqrt(np.diag(covariance))
     shift = covariance[1, 1] + covariance[3, 3] - 2.0 * covariance[1, 3] if both else math.nan

@@ -45,12 +45,12 @@ def test_a_force_at_another_lever_counts_by_its_deflection_at_this_one(
     bend = np.maximum(there_um - cells, 0.0)
     bent = float((bend * np.maximum(here_um - cells, 0.0)).sum()) * 600.0 / 20_000
     as_much = 3.0 * bent / here_um**3
-    (step,) = Loads.elsewhere([(Loads(np.zeros(1), np.ones(1)), there_um)], here_um).step_un
+    (step,) = Loads.of_others([(Loads(np.zeros(1), np.ones(1)), there_um)], here_um).step_un
     assert step == pytest.approx(as_much, rel=1e-4)
 
 
 def test_without_loads_nothing_is_lost() -> None:
-    assert Loads.elsewhere([], 300.0) is NO_LOADS
+    assert Loads.of_others([], 300.0) is NO_LOADS
     assert NO_LOADS.lost_un(np.array([1.0, 2.0])) == pytest.approx([0.0, 0.0])
 
 
