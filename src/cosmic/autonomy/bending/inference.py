@@ -550,7 +550,7 @@ def budget_of(
         _line(
             "friction on a section askew",
             Kind.B,
-            settings.askew_std,
+            _typical_std(weights, readings.askew),
             "",
             _root(weights, readings.askew),
         ),
@@ -577,6 +577,10 @@ def budget_of(
         for name, kind, std, unit, slope, part in lines
     ]
     return tuple(sorted(budget, key=lambda line: -line.share))
+
+
+def _typical_std(weights: Floats, covariance: Floats) -> float:
+    return math.sqrt(float(np.average(np.diag(covariance), weights=weights**2)))
 
 
 def _root(weights: Floats, covariance: Floats) -> float:
