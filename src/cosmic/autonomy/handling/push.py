@@ -418,8 +418,6 @@ class OneSpan:
     def _dwell(self) -> Steps:
         """Read the force at the farthest point for a while: the fibre may relax."""
         push = self._push
-        if len(self._fibre.spans) % push.dwell_every:
-            return
         for _ in range(push.dwell_looks):
             yield push.dwell_s / push.dwell_looks
             yield from self._measure(push.average_s, loading=True)

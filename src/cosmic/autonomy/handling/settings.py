@@ -188,9 +188,9 @@ class PushSettings(StrictModel):
         The same while the fibre is looked for.
     steps_out, steps_back : int
         Steps of one push; the way back of a short stroke has a few more.
-    dwell_s, dwell_looks, dwell_every : float, int, int
-        How long the probe stays where it pushed farthest, how often the force is read meanwhile,
-        and at every how many spans: it shows how the fibre relaxes.
+    dwell_s, dwell_looks : float, int
+        How long the probe stays where it pushed farthest, and how often the force is read
+        meanwhile: it shows how the fibre relaxes.
     slide_um, slide_every, slide_un : float, int, float
         How far a pushed fibre is slid up and down the probe, and back to where it was, so that
         friction lets go of it (0: it is not); at every how many spans; and from which force above
@@ -227,11 +227,10 @@ class PushSettings(StrictModel):
     settle_s: float = Field(0.02, ge=0.0)
     average_s: float = Field(0.04, gt=0.0)
     search_average_s: float = Field(0.02, gt=0.0)
-    steps_out: int = Field(7, ge=4)
+    steps_out: int = Field(9, ge=4)
     steps_back: int = Field(6, ge=3)
     dwell_s: float = Field(0.6, ge=0.0)
     dwell_looks: int = Field(3, ge=0)
-    dwell_every: int = Field(2, ge=1)
     slide_um: float = Field(10.0, ge=0.0, le=20.0)
     slide_every: int = Field(2, ge=1)
     slide_un: float = Field(1.2, gt=0.0)
