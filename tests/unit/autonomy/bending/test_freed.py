@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from cosmic.autonomy.bending.crept import Loads
 from cosmic.autonomy.bending.fit import (
     assess_campaign,
     fit_bending,
@@ -90,3 +91,23 @@ def test_the_friction_is_small_where_both_branches_agree_and_no_slide_lets_go() 
         fibres.append(measure_fibre(spans, settings=settings))
     found = assess_campaign(fibres, standards=[], settings=settings)
     assert found.friction < 0.9 * settings.friction
+
+
+def test_a_fibre_that_comes_back_from_an_earlier_push_is_not_taken_to_be_held() -> None:
+    span = pushed(rig())[0]
+    before_un = span.force_un[AFTER] - LEVEL_UN
+    read_s = span.time_s[AFTER]
+    earlier = Loads.of_push(read_s - np.array([3.0, 2.0, 1.0]), np.array([0.0, 60.0, 60.0]))
+    lost_un = earlier.lost_un(read_s + np.array([0.0, 0.9]))
+    # It stands nearer to the probe by as much as it has come back: the force has risen by that.
+    rose_un = 0.05 * float(lost_un[0] - lost_un[1])
+    fell_un = 0.05 * before_un
+    after = np.array([span.force_un[AFTER] + rose_un - fell_un])
+    slid = dataclasses.replace(span, freed=Freed(AFTER, after, after, 0.001, 0.9))
+    baseline_un = np.full(len(span.probe_um), LEVEL_UN)
+    log, std = freed_of(slid, baseline_un, 0.05, earlier)
+    alone, sure = freed_of(slid, baseline_un, 0.05)
+    assert rose_un > 0.02 * before_un
+    assert log == pytest.approx(0.0, abs=0.01)
+    assert alone > log + 0.02
+    assert std > sure, "what is put right twice is known less"
