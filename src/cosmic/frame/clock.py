@@ -14,8 +14,14 @@ from typing import Final, Protocol
 
 from typing_extensions import override
 
-from cosmic.frame.expectations import Expectations
-from cosmic.frame.time_scale import Horizon, ScaledHorizon, ScaledWorker, TimeScale, Worker
+from cosmic.frame.time_scale import (
+    Expectations,
+    Horizon,
+    ScaledHorizon,
+    ScaledWorker,
+    TimeScale,
+    Worker,
+)
 
 
 def wall_now_s() -> float:

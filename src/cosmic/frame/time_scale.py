@@ -6,11 +6,13 @@ hurried. So while a procedure is under way the time runs at its rate only as lon
 waits for it, and as the wall does while somebody is at work.
 
 What a busy computer is late with is no trouble of the platform either: who must keep up with the
-time says how far it may go, and it waits there for everybody at once.
+time says how far it may go, and it waits there for everybody at once. And who brings something in
+pieces, which are longer on a fast clock, ends one where somebody waits for it.
 """
 
 import math
 import threading
+from bisect import bisect_right, insort
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -18,12 +20,16 @@ from typing import Final
 
 from typing_extensions import override
 
+from cosmic.frame.events import Event
+
 LOOK_S: Final = 0.02
 """How often somebody looks again who waits while others work, and may miss their end; wall time."""
 LATE_S: Final = 0.0005
 """How much too late somebody may wake who is not woken for it, wall time."""
 LONGEST_HOLD_S: Final = 3.0
 """The time waits so long and then goes on without all who were silent meanwhile, wall time."""
+MOST_EXPECTED: Final = 64
+"""So many times that nobody has come to are kept; the latest ones go first."""
 REACHED_EVERY_S: Final = 0.25
 REACHED_MARKS: Final = 8
 """The rate reached is that of the last two seconds."""
@@ -278,3 +284,38 @@ class ScaledWorker(Worker):
             if not self._closed and busy is not self._busy:
                 self._busy = busy
                 self._time_scale.change(busy=1 if busy else -1)
+
+
+class Expectations:
+    """Times at which somebody wants what there is by then; any thread.
+
+    On a clock that runs faster than the wall samples come in longer pieces, and who waits for some
+    would wait for the end of a piece, which a real platform does not know.
+
+    Attributes
+    ----------
+    added : Event
+        There is one more, at this time.
+    """
+
+    def __init__(self) -> None:
+        self.added: Event[float] = Event("an expectation")
+        self._lock = threading.Lock()
+        self._times_s: list[float] = []
+
+    def add(self, time_s: float) -> None:
+        """Want what there is at `time_s`."""
+        if not math.isfinite(time_s):
+            return
+        with self._lock:
+            insort(self._times_s, time_s)
+            del self._times_s[MOST_EXPECTED:]
+        self.added.emit(time_s)
+
+    def next_s(self, after_s: float) -> float:
+        """Return the nearest one after `after_s`, inf for none; forgets those before."""
+        if not self._times_s:
+            return math.inf
+        with self._lock:
+            del self._times_s[: bisect_right(self._times_s, after_s)]
+            return self._times_s[0] if self._times_s else math.inf

@@ -43,7 +43,7 @@ class FitSettings(StrictModel):
         Between probe and fibre.
     askew_std : float
         Part of its compliance that friction takes on the way out, and adds on the way back, from
-        a section that stands askew: its standard deviation over fibres.
+        a section that stands askew, where no slide showed it: its standard deviation over fibres.
     cross_std_part : float
         Of a force along the probe's edge, how much the sensor reads as one across.
     relaxation_part, relaxation_std_part : float

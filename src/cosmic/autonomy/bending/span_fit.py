@@ -134,7 +134,7 @@ class _Model:
         self.curves, self.stiff_probe = curves
         self._elapsed_s = points.time_s - points.time_s[0]
         self._lost, self.others = lost(points.time_s), others
-        self._lost_to_others_un = others.lost_un(points.time_s)
+        self._lost_of_others_un = others.lost_un(points.time_s)
         # A way back that never touches says where the baseline is, and nothing of the fibre.
         clear = clear_points(points, ~points.loading)
         self.branches = [points.loading, ~points.loading] if clear else [points.loading]
@@ -148,7 +148,7 @@ class _Model:
             ahead = self._points.probe_um[branch] - hinge_um
             force[branch] = self._force(ahead, log_k, self.curves[number])
         # What has crept stands back from the probe: it is left sooner, and never pulls.
-        lost_un = self._lost @ force + self._lost_to_others_un
+        lost_un = self._lost @ force + self._lost_of_others_un
         left_un = np.maximum(force - values[-1] * lost_un, 0.0)
         return np.asarray(np.where(force > 0.0, left_un, 0.0))
 
@@ -174,7 +174,7 @@ class _Model:
             force[branch] = here
             by_value[2 * number, branch] = (stiffer - here) / TINY
             by_value[2 * number + 1, branch] = (there - here) / TINY
-        lost_un = self._lost @ force + self._lost_to_others_un
+        lost_un = self._lost @ force + self._lost_of_others_un
         by_value[:count] -= values[-1] * (by_value[:count] @ self._lost.T)
         by_value[-1] = -lost_un
         by_value *= (force > values[-1] * lost_un) & (force > 0.0)
