@@ -1,6 +1,7 @@
 """The analysis on pushes of the twin's fibres, without images: effects alone, and all at once."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -163,6 +164,24 @@ def test_what_creeps_relaxes_alike_at_each_span_and_as_much_after_earlier_pushes
     # The same noise in both: what a slide shows is not mistaken for what creeps.
     for one, other in zip(plain, creeps, strict=True):
         assert other.freed_log == pytest.approx(one.freed_log, abs=0.02)
+
+
+@pytest.mark.parametrize("left", [2, 4])
+def test_a_way_back_that_is_cut_off_loads_the_fibre_no_longer_than_it_was_pushed(left: int) -> None:
+    creeps = settings(FIBRE.model_copy(update={"relaxation_per_decade": 0.06}))
+    whole, _ = measured(creeps, 0, {})
+    *others, last = whole.raw
+    cut_off = [begun(each, int(each.loading.sum()) + left) for each in others]
+    found = measure_fibre([*cut_off, last], settings=whole.settings)
+    assert [fit.freed_log for fit in found.spans] == pytest.approx(
+        [fit.freed_log for fit in whole.spans], abs=0.015
+    )
+
+
+def begun(span: Span, readings: int) -> Span:
+    """Return the first readings of a span."""
+    names = ("probe_um", "force_un", "force_std_un", "time_s", "loading")
+    return replace(span, **{name: getattr(span, name)[:readings] for name in names})
 
 
 def test_with_all_effects_of_the_realistic_world_the_truth_is_inside() -> None:

@@ -104,7 +104,8 @@ class _Pushed:
     ) -> "_Pushed":
         first = rough(points, points.loading, points.free_force_un)
         every = points_of(span)
-        free_un = np.interp(every.time_s, points.time_s, points.free_force_un)
+        # Of the way out: a way back that is cut off ends under load.
+        free_un = points.free_force_un[0]
         loads = Loads.of_push(every.time_s, np.maximum(every.force_un - free_un, 0.0))
         return cls(points, shape, first, shape.lever_um(settings.offset_um), loads)
 

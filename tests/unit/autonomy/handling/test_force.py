@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from cosmic.autonomy.handling import force
+from cosmic.autonomy.handling.careful_move import LOOK_S, CarefulMove
 from cosmic.autonomy.handling.force import ForceWatch
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.scale import Scale
-from cosmic.frame.clock import ManualClock
+from cosmic.frame.clock import ManualClock, RatedClock
 from cosmic.frame.errors import ConfigError, DeviceTimeout, NotAvailable
 
 
@@ -103,3 +104,48 @@ def test_a_closed_watch_takes_no_more(watched: tuple[Daqco, ManualClock, ForceWa
     watch.close()
     watch.close()
     assert daqco.receiver is None
+
+
+class Movement:
+    """As much of a movement as one that is watched uses."""
+
+    done = False
+
+    def cancel(self) -> None:
+        self.done = True
+
+
+def on_a_fast_clock() -> tuple[Daqco, RatedClock, ForceWatch]:
+    daqco, clock = Daqco(), RatedClock(20.0)
+    watch = ForceWatch(daqco, "force", clock)  # type: ignore[arg-type]
+    watch.open()
+    return daqco, clock, watch
+
+
+def next_expected_s(clock: RatedClock, after_s: float = -1.0) -> float:
+    assert clock.expectations is not None
+    return clock.expectations.next_s(after_s)
+
+
+def test_on_a_fast_clock_a_reading_is_expected_at_its_end():
+    _, clock, watch = on_a_fast_clock()
+    begun_s = clock.now_s()
+    watch.wanted(0.04, settle_s=0.02)
+    assert begun_s + 0.06 <= next_expected_s(clock) <= clock.now_s() + 0.06
+
+
+def test_on_a_fast_clock_a_careful_move_is_looked_at_often():
+    daqco, clock, watch = on_a_fast_clock()
+    CarefulMove(Movement(), watch, -5.0, 5.0)  # type: ignore[arg-type]
+    first_s = next_expected_s(clock)
+    assert first_s <= clock.now_s() + LOOK_S
+    daqco.receiver(chunk(0, np.zeros(5)))
+    assert next_expected_s(clock, first_s) == np.inf, "one look ahead is enough"
+    clock.sleep(LOOK_S)
+    daqco.receiver(chunk(5, np.zeros(5)))
+    assert first_s < next_expected_s(clock, first_s) <= clock.now_s() + LOOK_S
+    daqco.receiver(chunk(10, np.full(5, 9.0)))
+    clock.sleep(LOOK_S)
+    last_s = clock.now_s()
+    daqco.receiver(chunk(15, np.zeros(5)))
+    assert next_expected_s(clock, last_s) == np.inf, "what has ended is watched no longer"
