@@ -173,6 +173,7 @@ def measure_fibre(
         part=part,
         certified=certified,
         direction=direction,
+        slipped=any(Quality.SLIPPED in each.flags for each in fits),
     )
     return MeasuredFibre(fits, used, readings, tuple(spans), settings, part, certificate)
 

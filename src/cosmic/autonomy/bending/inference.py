@@ -139,6 +139,9 @@ class Readings:
         Covariance by places of contact that do not repeat.
     askew : ndarray, shape (m, m), float64
         Covariance by friction that holds a section that stands askew; a standard is round.
+    slipped : bool
+        It slipped in a span, also one that is not among these: how deep others are clamped tells
+        nothing of it any more.
     """
 
     log_k: Floats
@@ -151,6 +154,7 @@ class Readings:
     response: Response
     longest: int
     certified: tuple[float, float] | None = None
+    slipped: bool = False
 
 
 def readings_of(
@@ -161,6 +165,7 @@ def readings_of(
     part: float = 0.0,
     certified: tuple[float, float] | None = None,
     direction: tuple[float, float] | None = None,
+    slipped: bool = False,
 ) -> Readings:
     """Return the readings of the spans of one fibre.
 
@@ -173,6 +178,8 @@ def readings_of(
     direction : tuple of float, optional
         By how much the fibre leaves the jaws in another direction than the image shows, and the
         standard deviation of that, rad; by the settings if None.
+    slipped : bool
+        See `Readings`.
     """
     rows = _rows(fits)
     span = np.array([each.span for each in rows])
@@ -209,6 +216,7 @@ def readings_of(
         response=response,
         longest=_longest(response),
         certified=certified,
+        slipped=slipped,
     )
 
 

@@ -149,7 +149,9 @@ def _prior_weights(
     total = logs.sum(axis=0) + np.log(prior)
     found = []
     for number, read in enumerate(readings):
-        left = total - logs[number] if read.certified is None else np.log(prior)
+        # A grip that gave way has its own depth now; a standard has it anyhow.
+        alone = read.slipped or read.certified is not None
+        left = np.log(prior) if alone else total - logs[number]
         weight = np.exp(left - left.max())
         depths = (weight / weight.sum()) @ of_depth
         found.append(depths[:, None] * spreads[None, :])

@@ -19,6 +19,8 @@ from cosmic.autonomy.bending.settings import FitSettings
 from oracles.pushed_rod import pushed
 from oracles.sealed_session import STANDARD_EI, Fibre, Session, World, curves
 from unit.autonomy.bending.sealed_fibres import SCALE, spans_of
+from unit.autonomy.bending.test_fit_bending import pushed as pushed_on_rig
+from unit.autonomy.bending.test_fit_bending import rig
 
 WORLD = World(
     noise_un=0.03,
@@ -157,3 +159,19 @@ def test_a_quiet_fibre_has_nothing_to_name() -> None:
     for found in fit_campaign(kept):
         assert found.trusted, found.reasons
         assert not found.notes
+
+
+def test_a_fibre_whose_grip_gave_way_is_not_clamped_as_deep_as_the_others() -> None:
+    settings = FitSettings()
+    others = [
+        measure_fibre(pushed_on_rig(rig(seed, clamp_um=10.0)), settings=settings)
+        for seed in range(12)
+    ]
+    loose = rig(99, clamp_um=75.0)
+    plain = pushed_on_rig(loose)
+    loose.slipped_um = 12.0
+    slipped = measure_fibre([loose.push(600.0, 30.0), *plain[1:4]], settings=settings)
+    assert Quality.SLIPPED in slipped.spans[0].flags
+    found = fit_campaign([*others, slipped], settings=settings)[-1]
+    assert found.ei_low_n_m2 < loose.ei_n_m2 < found.ei_high_n_m2
+    assert abs(found.ei_n_m2 / loose.ei_n_m2 - 1.0) < 0.15
