@@ -19,12 +19,10 @@ from cosmic.vico.core.vision.focal_stack import (
     height_map,
     sharp_image,
 )
-from cosmic.vico.core.vision.network import Network, find_network
+from cosmic.vico.core.vision.network import LEAST_SEGMENTS, Network, find_network
 from cosmic.vico.core.vision.spatial import SpatialFibre, View, heights_along, in_space
 from cosmic.vico.hw.interface import Pixels
 
-FEWEST_SEGMENTS = 20
-"""Less is dirt, not a network."""
 FEWEST_DENSE = 12
 """So many fibres of which none is certain may be a network as well."""
 
@@ -344,4 +342,4 @@ def _network(page: FileImage) -> Network | None:
         found = find_network(page.pixels)
     except NotAvailable:
         return None
-    return found if len(found.segments) >= FEWEST_SEGMENTS else None
+    return found if len(found.segments) >= LEAST_SEGMENTS else None

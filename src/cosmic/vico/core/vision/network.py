@@ -29,6 +29,16 @@ LEAST_AREA: Final = 12
 LEAST_SEGMENT: Final = 3.0
 LARGEST_SPREAD: Final = 0.1
 MOST_COVERED: Final = 0.6
+LEAST_SEGMENTS: Final = 20
+"""Fewer are dirt, or no sample to take statistics of."""
+MOST_TURNED_DEG: Final = 6.5
+"""In a width, on the mean: drawn networks of curly fibres turn by up to 6, rims of bubbles and
+grains by 7 to 14, and what noise makes by 14 to 22."""
+TURN_STEP: Final = 4
+RING_PART: Final = 0.1
+"""Ends nearer than this part of a segment's length make a ring of it."""
+MOST_CLOSED: Final = 0.3
+"""Share of the length in rings that nothing joins."""
 SCALES_WITH: Final = 0.5
 """A piece this much wider than the typical segment, as a part of it and above, is a bundle."""
 
@@ -36,6 +46,10 @@ UNSTABLE: Final = "its length changes by more than a tenth with the threshold"
 COVERED: Final = "fibres cover so much of the image that the ground between them is not seen"
 NARROW: Final = "its fibres are narrower than the image resolves"
 NOTHING: Final = "too little stands out to be a network"
+TURNING: Final = (
+    "for their width its segments bend more than fibres do: they may be noise, grains or bubbles"
+)
+CLOSED: Final = "much of it are closed rings, as of bubbles or drops"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -192,8 +206,10 @@ def _network(graph: Graph, factor: int, covered: float, lengths: Sequence[float]
     doubts = [
         reason
         for doubtful, reason in (
-            (len(segments) < 3, NOTHING),
+            (len(segments) < LEAST_SEGMENTS, NOTHING),
             (spread > LARGEST_SPREAD * max(lengths[1], 1e-9), UNSTABLE),
+            (_turned_deg(segments) > MOST_TURNED_DEG, TURNING),
+            (_closed(segments) > MOST_CLOSED, CLOSED),
             (covered > MOST_COVERED, COVERED),
             (typical < 1.2, NARROW),
         )
@@ -216,6 +232,31 @@ def _network(graph: Graph, factor: int, covered: float, lengths: Sequence[float]
 
 def _number(node: int) -> int:
     return -1 if node == FREE else node
+
+
+def _turned_deg(segments: Sequence[Segment]) -> float:
+    """Return by how much segments turn within the width of a typical one, on the mean."""
+    turned = length = 0.0
+    for each in segments:
+        steps = np.diff(each.line_px[::TURN_STEP], axis=0)
+        if len(steps) > 1:
+            angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+            turned += abs(float(angle[-1] - angle[0]))
+            length += float(np.linalg.norm(steps, axis=1).sum())
+    if not length:
+        return 0.0
+    return float(np.degrees(turned)) / length * float(np.median([one.width_px for one in segments]))
+
+
+def _closed(segments: Sequence[Segment]) -> float:
+    """Return the share of the length in segments without a junction whose ends meet."""
+    rings = sum(
+        each.length_px
+        for each in segments
+        if max(each.junctions) < 0
+        and np.linalg.norm(each.line_px[-1] - each.line_px[0]) < RING_PART * each.length_px
+    )
+    return rings / max(sum(each.length_px for each in segments), 1e-9)
 
 
 def _directions(segments: Sequence[Segment]) -> tuple[Floats, float, float]:
