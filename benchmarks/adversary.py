@@ -53,6 +53,7 @@ from cosmic.twin.scene import Scene
 NAME = "adversary"
 ROOT = Path(__file__).resolve().parents[1]
 START_S: Final = 60.0
+TELL_S: Final = 60.0
 SCENE = ROOT / "config" / "scenes" / "fiberstation.toml"
 
 
@@ -171,14 +172,7 @@ def attack(
         remote = _Client(endpoint, seed, folder) if client else None
         for thread in threads:
             thread.start()
-        # A client takes its time to start on a busy computer, and is what a short run is about too.
-        begun_s = time.monotonic()
-        while sum(each.calls for each in attacks) + (remote.total if remote else 0) < commands or (
-            remote is not None and not remote.begun and time.monotonic() < begun_s + START_S
-        ):
-            if time.monotonic() > end_s:
-                break
-            time.sleep(0.05)
+        _wait_for(commands, attacks, remote, end_s)
         ended.set()
         for thread in threads:
             thread.join()
@@ -188,6 +182,28 @@ def attack(
         watch.may_move()
         watch.end()
         return Result(watch.found, attacks, calls, raw)
+
+
+def _wait_for(
+    commands: int, attacks: Sequence[Attack], remote: "_Client | None", end_s: float
+) -> None:
+    """Wait until so many were given, and say each minute how many it are."""
+    begun_s = told_s = time.monotonic()
+    # A client takes its time to start on a busy computer, and is what a short run is about too.
+    while (given := _given(attacks, remote)) < commands or (
+        remote is not None and not remote.begun and time.monotonic() < begun_s + START_S
+    ):
+        now_s = time.monotonic()
+        if now_s > end_s:
+            return
+        if now_s >= told_s + TELL_S:
+            told_s = now_s
+            print(f"{(now_s - begun_s) / 60.0:.0f} min: {given} commands", file=sys.stderr)
+        time.sleep(0.05)
+
+
+def _given(attacks: Sequence[Attack], remote: "_Client | None") -> int:
+    return sum(each.calls for each in attacks) + (remote.total if remote else 0)
 
 
 class _Client:

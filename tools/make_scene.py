@@ -292,6 +292,9 @@ def table_assembly() -> list[Link]:
         ]),
         Link("plate", "table", (0.0, 0.0, 0.0), solids=[
             box((-12.0, -12.0, -1.0), (12.0, 12.0, 0.0), "glass", name="glass"),
+        ]),
+        # A body of its own: jaws may come down on the plate, but never run into its clip.
+        Link("plate_clip", "plate", (0.0, 0.0, 0.0), solids=[
             box((10.0, -4.0, 0.0), (12.0, 4.0, 0.2), "clip", name="clip"),
         ]),
     ]  # fmt: skip

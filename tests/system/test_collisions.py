@@ -60,6 +60,21 @@ def test_the_travel_that_is_said_to_be_free_is_free(rig: cosmic.Rig) -> None:
     assert MARGIN_UM - 1.0 < gap_um(rig) < MARGIN_UM + 4.0
 
 
+def test_a_grasp_may_touch_the_plate_but_not_the_clip_on_it(rig: cosmic.Rig) -> None:
+    down = {"left.z": -1495.0}
+    rig.mico.move({"left.x": -1156.0, "left.y": 2320.0, "table.rotation": 154.8})
+    with rig.mico.collision.contact("grasp"):
+        verdict = rig.mico.check(down)
+        assert verdict.reason is cosmic.Reason.COLLISION
+        assert "plate_clip" in verdict.bodies
+        with pytest.raises(cosmic.CollisionError):
+            rig.mico.move(down)
+        rig.mico.move({"table.rotation": 100.0})
+        assert rig.mico.check(down).allowed
+        rig.mico.move(down)
+        assert not rig.mico.check({"table.rotation": 154.8}).allowed, "nor may it turn into a jaw"
+
+
 def test_a_cold_platform_initialises_without_a_refusal(caplog: pytest.LogCaptureFixture) -> None:
     connected = cosmic.connect(rate=20.0, cold=True, applications=("mico",))
     with caplog.at_level(logging.WARNING), connected as rig:

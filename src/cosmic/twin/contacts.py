@@ -38,8 +38,8 @@ class Contacts:
     ----------
     record : callable
         Told "contact" when two bodies meet and "contact over" when they have parted, with the
-        names of both, the greatest depth, and whether it was meant: jaws land on the plate, and
-        the probe feels for a jaw.
+        names of both, the greatest depth, and whether it was meant: jaws land on the plate, not
+        on what stands there, and the probe feels for a jaw.
 
     Raises
     ------
@@ -59,7 +59,7 @@ class Contacts:
         self._links: list[str] = []
         self._slides: list[Slide] = []
         self._corners: list[Floats] = []
-        self._boxes: list[Floats] = []
+        self._boxes: list[tuple[str, Floats]] = []
         self._read(folder / settings.geometry.urdf)
         self._low = np.array([each.min(axis=0) for each in self._corners])
         self._high = np.array([each.max(axis=0) for each in self._corners])
@@ -163,10 +163,19 @@ class Contacts:
 
     def _read(self, path: Path) -> None:
         skeleton = self._skeleton
-        turning = skeleton.turning
-        for link, parts in read_solids(path, ()).items():
-            if link == self._plate:
-                self._boxes = [np.array([each.min(axis=0), each.max(axis=0)]) for each in parts]
+        turning, still = skeleton.turning, dict.fromkeys(self._stage_names, 0.0)
+        from_world = np.linalg.inv(skeleton.pose(self._plate, still))
+        solids = read_solids(path, ())
+        bottom = min(float(each[:, 2].min()) for each in solids[self._plate])
+        for link, parts in solids.items():
+            if skeleton.on(link, self._plate):
+                pose = from_world @ skeleton.pose(link, still)
+                for part in parts:
+                    placed = part @ pose[:3, :3].T + pose[:3, 3]
+                    box = np.array([placed.min(axis=0), placed.max(axis=0)])
+                    # Nothing leaves what stands on the plate through the plate.
+                    box[0, 2] = min(box[0, 2], bottom)
+                    self._boxes.append((link, box))
             elif link not in turning:
                 fixed = skeleton.fixed(link)
                 slide = Slide((0.0, 0.0, 0.0), ()) if fixed else skeleton.slide(link)
@@ -250,7 +259,7 @@ class Contacts:
         position = float(
             self._skeleton.pose(self._plate, dict.fromkeys(self._stage_names, 0.0))[2, 3]
         )
-        return max(float(box[1, 2]) for box in self._boxes) + position
+        return max(float(box[1, 2]) for _, box in self._boxes) + position
 
     def _on_plate(
         self,
@@ -259,7 +268,7 @@ class Contacts:
         positions: Floats,
         low: Floats,
     ) -> None:
-        """Add what stands in the plate or its clip: corners of one in the other."""
+        """Add what stands in the plate, or in what stands on it: corners of one in the other."""
         aboves = (low[self._above_plate, 2] - self._top_um).tolist()
         nearest = min(aboves, default=math.inf)
         self._slack_um = min(self._slack_um, nearest)
@@ -270,7 +279,7 @@ class Contacts:
             if above >= 0.0:
                 continue
             corners = (self._corners[number] + positions[number] - plate[:3, 3]) @ plate[:3, :3]
-            for box in self._boxes:
+            for link, box in self._boxes:
                 inside = np.minimum(corners - box[0], box[1] - corners)
                 depth = float(np.maximum.reduce(np.minimum.reduce(inside, axis=1)))
-                self._keep(found, (self._plate, self._links[number]), depth)
+                self._keep(found, (link, self._links[number]), depth)

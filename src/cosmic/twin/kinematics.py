@@ -125,6 +125,15 @@ class Skeleton:
         """Whether a link is the one that all joints start from."""
         return link not in self._joint_of
 
+    def on(self, link: str, other: str) -> bool:
+        """Whether a link is another one, or is firmly joined to it."""
+        while link != other:
+            joint = self._joint_of.get(link)
+            if joint is None or joint.drive is not None or joint.kind != "fixed":
+                return False
+            link = joint.parent
+        return True
+
     @property
     def turning(self) -> frozenset[str]:
         """The links that a stage turns."""

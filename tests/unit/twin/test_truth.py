@@ -80,6 +80,22 @@ def test_jaws_may_land_on_the_plate_softly() -> None:
     assert "contact" not in landed(-5.0).names
 
 
+def test_jaws_in_the_clip_of_the_plate_are_never_meant() -> None:
+    heard = Heard()
+    bench = Bench(
+        settings(LYING, start={"left.gripper": 600.0, "table.rotation": 154.8}), truth=heard
+    )
+    bench.go(left_x=-1156.0, left_y=2320.0).go(left_z=-1250.0)
+    assert bench.moment and "contact" not in heard.names, "it is 200 um high"
+
+    bench.go(left_z=-1490.0).go(left_z=-1000.0)
+
+    assert bench.moment
+    over = heard.facts("contact over")
+    assert "plate_clip" in over["bodies"] and not over["meant"]
+    assert over["depth_um"] == pytest.approx(190.0, abs=5.0)
+
+
 def test_jaws_that_run_into_each_other_are_reported_with_their_depth() -> None:
     heard = Heard()
     bench = Bench(settings(LYING, start={"left.gripper": 100.0}), truth=heard)

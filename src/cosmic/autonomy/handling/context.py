@@ -16,6 +16,7 @@ from cosmic.autonomy.handling.plate import Candidate, Jaws, PlateFrame
 from cosmic.autonomy.handling.retrying_move import RetryingMove, return_movement
 from cosmic.autonomy.handling.settings import HandlingSettings, of_arm
 from cosmic.autonomy.handling.sight import LastSeen, LiveImage, map_at
+from cosmic.autonomy.handling.standing import standing_on_plate
 from cosmic.autonomy.procedures.failures import failure_of
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps, UnitOperation
 from cosmic.autonomy.procedures.waits import Resource
@@ -31,6 +32,8 @@ from cosmic.vico.core.pixel_map import Floats, PixelMap
 from cosmic.vico.core.tool_settings import ToolSettings
 
 HEIGHTS: Final = "heights over the plate"
+BIN_ASIDE_UM: Final = 5000.0
+"""Where a clip of the plate stands in the bin, fibres are put away so far beside it."""
 
 
 def _never() -> bool:
@@ -76,6 +79,8 @@ class SharedWorkspace:
         Grippers that have begun with a fibre, whether they have chosen it yet or not.
     parks_limit : bool
         The force limit is armed only while the probe is out.
+    standing_um : tuple of ndarray, shape (n, 2)
+        Outlines of what stands on the plate, in its frame.
     enough : callable
         Says whether no further fibre is to be begun, for a procedure that treats many.
     """
@@ -103,6 +108,7 @@ class SharedWorkspace:
     arms: "dict[str, HandlingContext]" = field(default_factory=dict)
     seeking: set[str] = field(default_factory=set)
     parks_limit: bool = False
+    standing_um: tuple[Floats, ...] = ()
     enough: Callable[[], bool] = _never
 
     def done_with(self, fibre: HeldFibre) -> None:
@@ -244,6 +250,7 @@ class HandlingContext:
         for name in (settings.gripper, settings.probe, *filter(None, [settings.other])):
             work.tool(name)
         rig.vico.camera(settings.camera)
+        work.shared.standing_um = standing_on_plate(rig.mico)
         if isinstance(positions := work.vision.transform, PlatformTransform):
             work.calibration.registry = positions.registry
         forces.open()
@@ -343,6 +350,21 @@ class HandlingContext:
         if z_um is not None:
             targets[tool.z_axis] = z_um - tool.tip_um[2] - self.up_um(tool)
         return targets
+
+    def bin_position(self, z_um: float | None = None) -> dict[str, float]:
+        """Return where the gripper's axes stand above the bin, beside what stands there."""
+        positions, jaws = self.settings.places, self.jaws
+        x, y = positions.bin_x_um * jaws.forward, positions.bin_y_um
+        if self.shared.standing_um:
+            frame, angle = self.calibration.frame, self.table_deg
+            standing = [frame.on_platform(each, angle) for each in self.shared.standing_um]
+            free = (
+                aside
+                for aside in (y, y - BIN_ASIDE_UM, y + BIN_ASIDE_UM)
+                if not jaws.over(standing, (x, aside), self.settings.grasp)
+            )
+            y = next(free, y)
+        return self.at(self.gripper, x, y, z_um)
 
     def go(self, targets: Mapping[str, float]) -> RetryingMove:
         """Begin to move; to be yielded."""

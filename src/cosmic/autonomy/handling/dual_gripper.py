@@ -9,7 +9,7 @@ from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.grasp import Carry
 from cosmic.autonomy.handling.plate import PlateFrame, Reach
 from cosmic.autonomy.handling.prepare import clear_image
-from cosmic.autonomy.handling.put_away import SKIPPED, Wipe, bin_position
+from cosmic.autonomy.handling.put_away import SKIPPED, Wipe
 from cosmic.autonomy.handling.survey import NONE_LEFT, Choose, approaches_of, none_left
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.frame.errors import MoveRefused
@@ -147,7 +147,7 @@ class WipeInTurn(Wipe):
     @override
     def steps(self, work: HandlingContext) -> Steps:
         yield work.rise(work.settings.places.travel_um)
-        yield work.go(bin_position(work))
+        yield work.go(work.bin_position())
         try:
             # Without leave to touch: the gate knows what stands there.
             yield work.go_up(LOW_UM)

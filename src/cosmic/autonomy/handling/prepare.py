@@ -141,6 +141,8 @@ def _initialise(work: HandlingContext) -> Steps:
 OTHER_UP_UM = 5000.0
 OTHER_BACK_UM = 4000.0
 TURN_ON_DEG = 41.0
+ANGLES: Final = 4
+"""Of the table at which the gripper is tried to be taken about just above the plate."""
 PLATE = "map of the plate"
 HELD = "map where fibres are held"
 TABLE = "rotation centre"
@@ -186,9 +188,7 @@ class MakeReady(FibreOperation):
             other = work.tool(settings.other)
             yield work.go({other.x_axis: OTHER_BACK_UM * (-1.0 if other.forward[0] > 0.0 else 1.0)})
         # What may be left between the jaws falls where fibres are put away.
-        yield work.go(
-            work.at(work.gripper, positions.bin_x_um * work.jaws.forward, positions.bin_y_um)
-        )
+        yield work.go(work.bin_position())
         with work.mico.collision.contact("grasp"):
             yield work.go_up(positions.bin_um)
         yield from zero_jaws(work)
@@ -258,11 +258,24 @@ class CalibratePlate(Calibrated):
     @override
     def measure(self, work: HandlingContext) -> Steps:
         position = work.settings.calibration
-        residual = yield from calibrate_at(
-            work, position.place_x_um, position.place_y_um, position.place_um
-        )
+        residual = yield from self._clear_of_standing(work)
         self.kept(work, residual, "px", position.residual_px)
         work.calibration.zoom_run = work.shared.zoom_runs
+
+    @staticmethod
+    def _clear_of_standing(work: HandlingContext) -> Generator[Yielded, object, float]:
+        """Take the gripper about just above the plate, with its clip out of the way."""
+        position = work.settings.calibration
+        x, y, z = position.place_x_um, position.place_y_um, position.place_um
+        for _ in range(ANGLES - 1):
+            try:
+                return (yield from calibrate_at(work, x, y, z))
+            except MoveRefused as refusal:
+                if refusal.verdict.reason is not Reason.COLLISION:
+                    raise
+                logger.warning("the table turns on, what stands on it is in the way: %s", refusal)
+            yield from TurnOn().steps(work)
+        return (yield from calibrate_at(work, x, y, z))
 
     @override
     def check(self, work: HandlingContext, entry: CalibrationEntry) -> Holds:

@@ -35,7 +35,7 @@ class ToBin(FibreOperation):
         yield work.rise(positions.travel_um)
         if work.held_fibre().bending is not None:
             yield from self._look_while_moving(work)
-        yield work.go(bin_position(work))
+        yield work.go(work.bin_position())
         with work.mico.collision.contact("grasp"):
             yield work.go_up(positions.bin_um)
 
@@ -50,12 +50,6 @@ class ToBin(FibreOperation):
         if not seen_at(work, fibre, image, in_jaws(work, fibre), work.height_now()):
             fibre.held, work.shared.surveyed = False, False
             work.shared.dropped.append(fibre)
-
-
-def bin_position(work: HandlingContext) -> dict[str, float]:
-    """Return where the gripper's axes stand above the bin."""
-    positions = work.settings.places
-    return work.at(work.gripper, positions.bin_x_um * work.jaws.forward, positions.bin_y_um)
 
 
 class Release(FibreOperation):
@@ -125,7 +119,7 @@ class Wipe(FibreOperation):
 
     def where(self, work: HandlingContext) -> dict[str, float]:
         """Return where the gripper's axes stand meanwhile."""
-        return bin_position(work)
+        return work.bin_position()
 
 
 class Finish(FibreOperation):

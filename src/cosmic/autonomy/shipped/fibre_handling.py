@@ -299,8 +299,7 @@ class FibreHandling:
                 (now, now | away, now | away | there),
             )
         if request.operation is SingleOperation.PUT_AWAY:
-            x = positions.bin_x_um * work.jaws.forward
-            there = work.at(work.gripper, x, positions.bin_y_um, positions.bin_um)
+            there = work.bin_position(positions.bin_um)
             return OperationPreview(
                 "The fibre is dropped into the bin, and the jaws are seen to be empty.",
                 (now, now | away, now | away | there),

@@ -83,3 +83,37 @@ def test_ways_with_nothing_under_the_jaws_come_before_smaller_turns():
     ways = found(one, behind)
     assert [each.under for each in ways] == [0, 1]
     assert [each.angle_deg for each in ways] == pytest.approx([120.0, -60.0])
+
+
+CLIP = np.array([[10e3, -4e3], [12e3, -4e3], [12e3, 4e3], [10e3, 4e3]])
+"""Stands on the plate, to the right of its middle where the table is at zero."""
+
+
+@pytest.mark.parametrize("forward", [1.0, -1.0])
+def test_no_path_leads_the_jaws_over_what_stands_on_the_plate(forward: float) -> None:
+    settings, jaws = GraspSettings(reach_x_um=8000.0), Jaws(forward)
+    free, kept = 0, 0
+    for x_um in range(-6000, 6001, 1500):
+        for angle_deg in range(-90, 90, 15):
+            for clip in ((), (CLIP,)):
+                ways = reaches(
+                    straight(x_um, 500.0, angle_deg),
+                    PlateFrame(),
+                    jaws,
+                    settings,
+                    Neighbours(standing_um=clip),
+                    0.0,
+                )
+                free, kept = (free, kept + len(ways)) if clip else (free + len(ways), kept)
+                assert not clip or not any(lies_under(each, forward) for each in ways)
+    assert 0.5 * free < kept < free, "some are left out, most are not"
+
+
+def lies_under(reach: Reach, forward: float) -> bool:
+    """Return whether a point of the clip lies under the jaws, as wide open as they go."""
+    grid = np.array(
+        [[x, y] for x in np.linspace(10e3, 12e3, 21) for y in np.linspace(-4e3, 4e3, 81)]
+    )
+    off = PlateFrame().on_platform(grid, reach.angle_deg) - np.array(reach.tip_um)
+    ahead, aside = off[:, 0] * forward, np.abs(off[:, 1])
+    return bool(((ahead < 0.0) & (ahead > -6000.0) & (aside < 600.0)).any())
