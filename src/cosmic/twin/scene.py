@@ -262,12 +262,14 @@ class Scene:
         return fitting or tuple(range(len(self.wiring)))
 
     def close(self) -> None:
-        """End the truth; harmless the second time."""
+        """End the truth, and let go of what images are drawn with; harmless the second time."""
         # Where nobody asked for forces, to go on to the end takes some 50 ms: for a listener only.
         if self.force_side is not None and self._truth is not NO_TRUTH:
             self.force_side.finish(self.clock.now_s())
         self._truth.record(self.clock.now_s(), "end")
         self._truth.close()
+        if self.optics is not None:
+            self.optics.close()
 
     @property
     def plate(self) -> int:

@@ -63,6 +63,10 @@ class Drawer(Protocol):
     def begin(self, view: str, shot: "Shot") -> Drawing:
         """Begin to draw what a view sees."""
 
+    @abstractmethod
+    def close(self) -> None:
+        """Let go of what it draws with; an image that is wanted after all is drawn here."""
+
 
 def make_views(settings: OpticsSettings, seed: int) -> dict[str, "View"]:
     """Return what draws, by view; it takes OpenCV, which takes time to import."""
@@ -94,6 +98,11 @@ class LocalDrawer(Drawer):
             if not self._views:
                 self._views = make_views(self._settings, self._seed)
         return self._views[view].draw(shot)
+
+    @override
+    def close(self) -> None:
+        with self._lock:
+            self._views = {}
 
 
 class _LocalDrawing(Drawing):
@@ -146,13 +155,14 @@ class RemoteDrawer(Drawer):
         self._lock = Lock()
         self._started = 0
         self._lying_key: object = None
-        finalize(self, process.dropped.append, self._set)
+        # Where nobody closes it, it goes with the last who knows of it.
+        self._end = finalize(self, process.dropped.append, self._set)
 
     @override
     def begin(self, view: str, shot: "Shot") -> Drawing:
         """Send the exposure; what lies on the plate only when it has changed."""
         here = self._local.begin(view, shot)
-        if self._process.is_behind():
+        if not self._end.alive or self._process.is_behind():
             return here
         drawing = _SentDrawing(self._process, here)
         with self._lock:
@@ -173,6 +183,11 @@ class RemoteDrawer(Drawer):
                 self._process.fail(exc)
                 return here
         return drawing
+
+    @override
+    def close(self) -> None:
+        self._end()
+        self._local.close()
 
 
 class DrawingProcess:

@@ -103,6 +103,10 @@ class Optics:
         self._lock = Lock()
         self._made: Subjects | None = None
 
+    def close(self) -> None:
+        """Let go of what images are drawn with; harmless the second time."""
+        self._drawer.close()
+
     @property
     def views(self) -> tuple[str, ...]:
         """Names of the views; the microscope's is the first."""

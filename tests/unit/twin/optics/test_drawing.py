@@ -135,3 +135,19 @@ def test_views_that_nobody_needs_are_dropped_there_too(process: DrawingProcess) 
     del drawer
     gc.collect()
     assert len(process.dropped) == 1
+
+
+def test_a_closed_scene_lets_go_of_its_views_and_can_still_be_drawn(
+    process: DrawingProcess, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosmic.twin.optics.optics.drawing_process", lambda: process)
+    scene = Scene.from_settings(shipped_settings(), ManualClock(), 3, apart=True)
+    assert scene.optics is not None
+    before = scene.optics.render(1.0)
+    assert not process.dropped
+
+    scene.close()
+    scene.close()
+
+    assert len(process.dropped) == 1, "although somebody still knows of it"
+    np.testing.assert_array_equal(scene.optics.render(1.0), before)
