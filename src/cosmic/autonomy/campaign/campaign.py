@@ -344,18 +344,28 @@ class Campaign:
             self._policy.report(exc, f"campaign {self.recipe.name!r}")
             failed, self._end_reason = True, f"program error: {exc}"
         finally:
-            self._leave(failed=failed)
-            leading.close()
+            try:
+                self._leave(failed=failed)
+            finally:
+                leading.close()
 
     def _leave(self, *, failed: bool) -> None:
-        self.work.close()
+        """Close all and come to the end, whatever fails on the way."""
+        kept = False
         try:
+            self.work.close()
             self._recorder.close(self._end_reason)
             self._analyse()
+            kept = True
         except CosmicError as exc:
-            failed, self._end_reason = True, f"{self._end_reason}; {exc}"
+            failed, kept, self._end_reason = True, True, f"{self._end_reason}; {exc}"
         finally:
             self.store.close()
+            if not kept:
+                self._end_reason = f"{self._end_reason}; program error at its end"
+            self._be_over(failed=failed or not kept)
+
+    def _be_over(self, *, failed: bool) -> None:
         end = CampaignPhase.ENDED if self._reached else CampaignPhase.STOPPED
         log = logger.error if failed else logger.info if self._reached else logger.warning
         log("campaign %s: %s", self.recipe.name, self._end_reason)
@@ -365,14 +375,20 @@ class Campaign:
 
     def _analyse(self) -> None:
         """Put final values into the record, and see whether all is there that was asked for."""
+        good = self.progress.good
         analysis = finish(self.store)
         self._recorder.read_again()
         if self._treatment.standard is not None and not (analysis and analysis.scale.verified):
             self._shortfall = "the standard did not verify the scale of the force"
         elif self._reached and not self._rule.reason(self.progress):
+            now = self.progress
             self._shortfall = (
-                f"by the final analysis {self.progress.good} fibres are good, fewer than the "
-                "campaign had come to itself"
+                f"by the final analysis {now.good} fibres are good, fewer than the campaign had "
+                "come to itself"
+                if now.good < good
+                else "by the final analysis the mean stiffness is known to "
+                f"+/-{now.mean.precision_percent:.1f} %, less well than the campaign had come to "
+                "itself"
             )
 
     def _treat_all(self) -> str:
