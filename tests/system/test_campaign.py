@@ -18,7 +18,7 @@ from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.recorded.steps import RecordedProcedure
 from cosmic.frame.errors import ArgumentError, ConfigError
 from cosmic.twin.truth import TruthRecord, read_truth
-from system.campaign_bench import Bench, bench
+from system.campaign_bench import Bench, bench, wait_for
 from system.campaign_trial import Trial
 from unit.autonomy.campaign.sample_records import INFO, good
 
@@ -161,6 +161,28 @@ def test_a_defect_of_the_final_analysis_leaves_no_campaign_that_seems_to_run(
     assert campaign.phase is CampaignPhase.FAILED
     assert "not now; program error" in campaign.end_reason
     CampaignStore.open(home / "broken", run=False).close()  # nobody has it any more
+
+
+def test_a_step_is_made_from_a_pause_between_two_fibres_too(rig: Rig, home: Path) -> None:
+    campaign = rig.campaign(recipe(home, 1, "transport"), home / "stepped")
+    ended: list[str] = []
+
+    def pause_at_once() -> None:
+        if not ended:
+            ended.append("paused")
+            campaign.pause()
+
+    campaign.on_change(pause_at_once)
+    campaign.start()
+    wait_for(lambda: campaign.phase is CampaignPhase.PAUSED, "the pause")
+    assert campaign.run is None
+    campaign.step()
+    wait_for(lambda: bool(campaign.times.summary()), "one operation")
+    wait_for(lambda: campaign.phase is CampaignPhase.PAUSED, "the rest after it")
+    assert [each.count for each in campaign.times.summary()] == [1]
+    campaign.abort("seen")
+    campaign.join()
+    assert campaign.over
 
 
 def test_a_mean_that_the_final_analysis_makes_less_sure_is_called_that(

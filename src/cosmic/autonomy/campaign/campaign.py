@@ -144,6 +144,7 @@ class Campaign:
         self._recorded = 0
         self._unwritten = False
         self._stuck = 0
+        self._stepping = False
         self._standards = StandardSchedule(
             work.settings.standard.at if treatment.standard is not None else ()
         )
@@ -258,7 +259,7 @@ class Campaign:
         with self._changed:
             if self._phase is not CampaignPhase.RUNNING:
                 return
-            self._phase = CampaignPhase.PAUSING
+            self._phase, self._stepping = CampaignPhase.PAUSING, False
             run = self._run
         if run is not None:
             run.pause()
@@ -269,7 +270,7 @@ class Campaign:
         with self._changed:
             if self._phase not in (CampaignPhase.PAUSING, CampaignPhase.PAUSED):
                 return
-            self._phase = CampaignPhase.RUNNING
+            self._phase, self._stepping = CampaignPhase.RUNNING, False
             self._changed.notify_all()
             run = self._run
         if run is not None:
@@ -279,11 +280,14 @@ class Campaign:
     def step(self) -> None:
         """Carry out one operation, then rest; harmless when it is over."""
         with self._changed:
-            if self._phase in OVER or self._run is None or self._run.over:
+            run = None if self._run is None or self._run.over else self._run
+            if self._phase in OVER or (run is None and self._phase is not CampaignPhase.PAUSED):
                 return
             self._phase = CampaignPhase.PAUSING
-            run = self._run
-        run.step()
+            self._stepping = run is None  # between two fibres: that of the next
+            self._changed.notify_all()
+        if run is not None:
+            run.step()
 
     def confirm_plate(self) -> None:
         """Say that the plate is there which `request` asks for.
@@ -600,7 +604,12 @@ class Campaign:
             if pausing and run is not None and run.state is RunState.PAUSED:
                 self._phase = CampaignPhase.PAUSED
         if pausing and run is not None and run.state is RunState.RUNNING:
-            run.pause()  # it was wanted while the run had not begun
+            # It was wanted while the run had not begun.
+            stepping, self._stepping = self._stepping, False
+            if stepping:
+                run.step()
+            else:
+                run.pause()
         self._publish()
 
     # Recording
