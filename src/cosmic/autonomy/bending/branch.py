@@ -102,8 +102,8 @@ def points_of(span: Span) -> Points:
             f"the span at {span.nominal_um:g} um has {np.sum(span.loading[kept])} points on the "
             f"way out, and a fit needs {LEAST_OUT}: measure it again with more steps"
         )
-    for word, way in (("out", kept & span.loading), ("back", kept & ~span.loading)):
-        if way.sum() > 1 and not np.ptp(span.probe_um[way]) > 0.0:
+    for word, branch in (("out", kept & span.loading), ("back", kept & ~span.loading)):
+        if branch.sum() > 1 and not np.ptp(span.probe_um[branch]) > 0.0:
             raise BendingError(
                 f"the span at {span.nominal_um:g} um: the probe stood at one position all the way "
                 f"{word}; look whether its sensor reads, and measure it again"
