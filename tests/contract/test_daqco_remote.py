@@ -196,6 +196,35 @@ def test_a_tare_calls_the_present_force_zero_and_says_what_it_was(rig: DaqcoRig)
         rig.daqco.tare("nothing")
 
 
+def test_a_tare_moves_no_other_channel_that_has_the_same_scale(rig: DaqcoRig) -> None:
+    channels = tuple(
+        each.model_copy(update={"scale": "Probe"}) for each in rig.daqco.settings.channel
+    )
+    rig.daqco.apply(rig.daqco.settings.model_copy(update={"channel": channels}))
+    before = rig.daqco.scales
+    assert wait_until(lambda: rig.daqco.latest_chunk is not None)
+    rig.daqco.tare("force")
+    assert rig.daqco.scales["force"] != before["force"]
+    assert rig.daqco.scales["channel1"] == before["channel1"]
+    name = rig.daqco.scales["force"].name
+    rig.daqco.tare("force")
+    assert rig.daqco.scales["force"].name == name
+
+
+def test_a_second_tare_before_new_samples_came_finds_zero(rig: DaqcoRig) -> None:
+    assert wait_until(lambda: rig.daqco.latest_chunk is not None)
+    rig.home.application.stop_acquisition()  # so that none come
+    rig.daqco.tare("force")
+    assert rig.daqco.tare("force") == pytest.approx(0.0, abs=1e-9)
+
+
+def test_recordings_are_listed_beside_a_link_that_leads_nowhere(rig: DaqcoRig) -> None:
+    folder = rig.daqco.directory
+    (folder / "a.h5").touch()
+    (folder / "gone.h5").symlink_to(folder / "nowhere.h5")
+    assert rig.daqco.recordings(folder) == (folder / "a.h5",)
+
+
 @pytest.mark.parametrize("name", ["a.csv", "a", "a.tdms", "a.b", ""])
 def test_a_recording_is_written_under_no_name_of_another_format(rig: DaqcoRig, name: str) -> None:
     file = rig.daqco.directory / name

@@ -3,6 +3,7 @@
 import csv
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,13 +12,15 @@ from cosmic.app.panels.campaign.output import write_output
 from cosmic.app.rig import Rig
 from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.recipe import OutputSettings
-from cosmic.autonomy.campaign.records import CampaignError, Outcome
+from cosmic.autonomy.campaign.records import CampaignError, Outcome, Pose
+from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.recorded.steps import RecordedProcedure
 from cosmic.frame.errors import ArgumentError, ConfigError
 from cosmic.twin.truth import TruthRecord, read_truth
-from system.campaign_bench import Bench, bench
+from system.campaign_bench import Bench, bench, wait_for
 from system.campaign_trial import Trial
+from unit.autonomy.campaign.sample_records import INFO, good
 
 RATE = 20.0
 RECIPE = """
@@ -134,6 +137,83 @@ def test_another_recipe_is_refused_in_the_folder_of_a_campaign(
 ) -> None:
     with pytest.raises(CampaignError, match="another recipe"):
         rig.campaign(recipe(home, 2), done.store.folder)
+
+
+def test_a_record_of_real_fibres_is_not_gone_on_with_on_the_twin(rig: Rig, home: Path) -> None:
+    asked = recipe(home, 3)
+    info = replace(INFO, recipe_text=asked.read_text("utf-8"), hardware="FiberStation", seed=0)
+    CampaignStore.create(home / "real", info).close()
+    with pytest.raises(CampaignError, match="the platform FiberStation, and this is the digital"):
+        rig.campaign(asked, home / "real")
+
+
+def test_a_defect_of_the_final_analysis_leaves_no_campaign_that_seems_to_run(
+    rig: Rig, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_store: CampaignStore) -> None:
+        raise ValueError("a defect")
+
+    monkeypatch.setattr("cosmic.autonomy.campaign.campaign.finish", broken)
+    campaign = rig.campaign(recipe(home, 1), home / "broken")
+    with pytest.raises(ValueError, match="a defect"):
+        campaign.abort("not now")
+    assert campaign.over
+    assert campaign.phase is CampaignPhase.FAILED
+    assert "not now; program error" in campaign.end_reason
+    CampaignStore.open(home / "broken", run=False).close()  # nobody has it any more
+
+
+def test_a_step_is_made_from_a_pause_between_two_fibres_too(rig: Rig, home: Path) -> None:
+    campaign = rig.campaign(recipe(home, 1, "transport"), home / "stepped")
+    ended: list[str] = []
+
+    def pause_at_once() -> None:
+        if not ended:
+            ended.append("paused")
+            campaign.pause()
+
+    campaign.on_change(pause_at_once)
+    campaign.start()
+    wait_for(lambda: campaign.phase is CampaignPhase.PAUSED, "the pause")
+    assert campaign.run is None
+    campaign.step()
+    wait_for(lambda: bool(campaign.times.summary()), "one operation")
+    wait_for(lambda: campaign.phase is CampaignPhase.PAUSED, "the rest after it")
+    assert [each.count for each in campaign.times.summary()] == [1]
+    campaign.abort("seen")
+    campaign.join()
+    assert campaign.over
+
+
+def test_a_mean_that_the_final_analysis_makes_less_sure_is_called_that(
+    rig: Rig, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def apart(store: CampaignStore) -> None:
+        store.keep_analysis(
+            {
+                each.number: replace(each.bending, ei_n_m2=5e-11 * 4.0**each.number)
+                for each in store.reader.finished()
+                if each.bending is not None
+            },
+            {},
+        )
+
+    monkeypatch.setattr("cosmic.autonomy.campaign.campaign.finish", apart)
+    path = home / "precise.toml"
+    path.write_text(
+        'procedure = "bend test"\n[stop]\nprecision_percent = 60.0\nleast = 3\n', "utf-8"
+    )
+    info = replace(INFO, recipe_text=path.read_text("utf-8"), seed=1)
+    with CampaignStore.create(home / "precise", info) as store:
+        for _ in range(3):
+            number = store.begin_fibre(Pose(300.0, -150.0, 12.0), time_s=1.0)
+            store.finish_fibre(good(number, began_s=1.0))
+        store.end("evening", time_s=99.0)
+    campaign = rig.campaign(path, home / "precise")
+    campaign.run_here()
+    assert campaign.phase is CampaignPhase.ENDED
+    assert "known to +/-" in campaign.shortfall
+    assert "fewer" not in campaign.shortfall
 
 
 def test_a_wrong_recipe_is_refused_with_file_key_and_reason(rig: Rig, home: Path) -> None:

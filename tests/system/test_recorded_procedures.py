@@ -9,12 +9,14 @@ import pytest
 
 import cosmic
 from cosmic.autonomy.handling.marked import MarkedFibre
+from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.autonomy.recorded.operations import Surroundings
 from cosmic.autonomy.recorded.recorder import ProcedureRecorder
 from cosmic.autonomy.recorded.replay import replay_on
 from cosmic.autonomy.recorded.steps import (
     MoveStep,
     RecordedProcedure,
+    WaitForForceStep,
     WaitForOperatorStep,
     load_recorded,
 )
@@ -61,6 +63,15 @@ def test_a_light_that_becomes_known_was_set_by_nobody() -> None:
             light.return_value = SimpleNamespace(percent=60.0)
             assert recorder.look()
         assert [each.words for each in recorder.steps] == ["Light 60 %"]
+
+
+def test_a_force_is_waited_for_on_the_channel_that_the_step_names() -> None:
+    with cosmic.connect(rate=20.0) as rig:
+        for channel, why in (("elsewhere", "no force channel 'elsewhere'"), ("force", "in 0.2 s")):
+            step = WaitForForceStep(channel=channel, force_un=150.0, timeout_s=0.2)
+            run = replay_on(rig.handling, RecordedProcedure(name="w", step=[step]), Surroundings())
+            with pytest.raises(OperationFailed, match=why):
+                run.run_here()
 
 
 @pytest.mark.slow

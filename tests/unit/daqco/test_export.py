@@ -219,3 +219,10 @@ def test_a_file_does_not_end_like_one_of_another_format(recorded, to, out):
 def test_a_folder_is_no_recording(folder):
     with pytest.raises(RecordingError, match="is a directory"):
         export_file(folder, "csv")
+
+
+@pytest.mark.parametrize("name", ["x" * 300, "x" * 249])
+def test_what_is_no_name_of_a_file_is_refused_as_such(recorded, tmp_path, name):
+    path, _ = recorded
+    with pytest.raises(RecordingError, match=r"is no name of a file|cannot be written"):
+        export_file(path, "csv", tmp_path / f"{name}.csv")

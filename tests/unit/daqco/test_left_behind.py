@@ -317,3 +317,10 @@ def test_notes_stay_few(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     for number in range(20):
         notes.note(tmp_path / f"{number}.h5")
     assert len(list((tmp_path / "notes").iterdir())) <= 5
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="its names are text")
+def test_a_folder_whose_name_is_no_text_costs_a_note_and_no_recording(tmp_path: Path) -> None:
+    notes = OpenRecordings(tmp_path / "notes")
+    assert notes.note(tmp_path / os.fsdecode(b"caf\xe9") / "run.h5") is None
+    assert not list(tmp_path.glob("notes/*"))

@@ -264,3 +264,16 @@ def test_simulated_data_are_missed_by_the_platforms_clock_and_real_ones_by_the_w
     rig.clock.advance(0.03)
     rig.guard.look_for_silence()
     assert len(rig.stops) == 1
+
+
+def test_one_acknowledged_while_nothing_is_acquired_trips_anew_where_the_force_still_is() -> None:
+    rig = Rig()
+    rig.arm()
+    rig.guard.look(chunk([4.0]))
+    rig.guard.set_rate(0.0)
+    rig.guard.acknowledge("force")
+    rig.guard.set_rate(1000.0)
+    assert rig.guard.limits["force"].armed
+    rig.guard.look(chunk([4.0]))
+    assert len(rig.stops) == 2
+    assert rig.guard.limits["force"].tripped

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -450,6 +451,37 @@ def test_a_file_that_is_being_recorded_cannot_be_replaced(tmp_path):
     with pytest.raises(RecordingError, match="cannot be created"):
         RecordingFile(tmp_path / "run.h5", header(), overwrite=True)
     file.close(complete=True)
+
+
+def test_a_file_that_another_program_records_to_stays_whole_when_it_cannot_be_replaced(tmp_path):
+    script = (
+        "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[1])\n"
+        "from cosmic.daqco.core.recording_file import RecordingFile\n"
+        "from cosmic.frame.errors import RecordingError\n"
+        "from unit.daqco.recording_helpers import header\n"
+        "try: RecordingFile(Path(sys.argv[2]), header(), overwrite=True)\n"
+        "except RecordingError as exc: print(exc)\n"
+    )
+    head = header()
+    path, volts = tmp_path / "run.h5", volts_of(2, 100)
+    file = RecordingFile(path, head)
+    for chunk in chunks(head, volts, 50):
+        file.append(chunk)
+    file.flush()
+    command = [sys.executable, "-c", script, str(Path(__file__).parents[2]), str(path)]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "is in use" in said
+    file.close(complete=True)
+    with open_recording(path) as found:
+        assert np.array_equal(found.volts("force"), volts[0])
+
+
+def test_half_a_letter_in_a_mark_costs_no_recording(tmp_path):
+    file = RecordingFile(tmp_path / "run.h5", header())
+    file.add_event(RecordedEvent(1.0, 0, "mark", "caf\udce9"))
+    file.close(complete=True)
+    with open_recording(tmp_path / "run.h5") as found:
+        assert [each.text for each in found.events] == ["caf?"]
 
 
 @pytest.mark.parametrize("content", [b"", b"no HDF5 at all", b"\x89HDF\r\n\x1a\n" + bytes(500)])

@@ -102,6 +102,12 @@ def points_of(span: Span) -> Points:
             f"the span at {span.nominal_um:g} um has {np.sum(span.loading[kept])} points on the "
             f"way out, and a fit needs {LEAST_OUT}: measure it again with more steps"
         )
+    for word, branch in (("out", kept & span.loading), ("back", kept & ~span.loading)):
+        if branch.sum() > 1 and not np.ptp(span.probe_um[branch]) > 0.0:
+            raise BendingError(
+                f"the span at {span.nominal_um:g} um: the probe stood at one position all the way "
+                f"{word}; look whether its sensor reads, and measure it again"
+            )
     return Points(
         span.probe_um[kept],
         span.force_un[kept],
@@ -135,9 +141,11 @@ def stuck(points: Points, drift_un_sqrt_s: float) -> Mask:
 
 
 def rough(points: Points, branch: Mask, baseline_un: Floats) -> Rough:
-    """Return where a branch has its kink, trying each position."""
+    """Return where a branch has its kink, trying each position; no rise where there is but one."""
     order = np.argsort(points.probe_um[branch], kind="stable")
     travel = points.probe_um[branch][order]
+    if not np.ptp(travel) > 0.0:
+        return Rough(float(travel[0]), 0.0)
     force = (points.force_un - baseline_un)[branch][order]
     positions = np.unique(np.concatenate([travel, (travel[1:] + travel[:-1]) / 2.0]))[:-1]
     ramp = np.maximum(travel - positions[:, None], 0.0)

@@ -42,6 +42,10 @@ NORMAL_95: Final = 1.96
 LEAST_RUB, MOST_RUB = 0.02, 0.8
 """Friction that curves are laid out for."""
 
+FARTHEST_LN: Final = 300.0
+"""Of a stiffness: what lies beyond is none."""
+NO_STIFFNESS: Final = "no stiffness comes of these forces: look at sensor and probe"
+
 SPOILT: Final = frozenset(
     {
         Quality.SLIPPED,
@@ -330,6 +334,8 @@ def _concluded(
     verified: bool,
 ) -> BendingResult:
     posterior, scale = assessed.posterior, N_M2_PER_UN_UM2
+    if not -FARTHEST_LN < posterior.log_low <= posterior.log_high < FARTHEST_LN:
+        return replace(_nothing(fibre, settings), reasons=(NO_STIFFNESS,))
     chi2 = float(assessed.evidence.chi2.min())
     result = BendingResult(
         ei_n_m2=math.exp(posterior.log_ei) * scale,

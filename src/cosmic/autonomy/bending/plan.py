@@ -104,7 +104,8 @@ def plan_spans(
     """
     limits, settings = limits or SpanLimits(), settings or FitSettings()
     room_um = min(limits.longest_um, length_free_um - limits.beyond_um)
-    if not room_um >= limits.shortest_um:
+    # Of the length as well: the smaller of a number and no number is the number.
+    if not (room_um >= limits.shortest_um and length_free_um > 0.0):
         raise BendingError(
             f"{length_free_um:.0f} um of free fibre is too short: the shortest span is "
             f"{limits.shortest_um:g} um, and {limits.beyond_um:g} um must remain beyond the probe"

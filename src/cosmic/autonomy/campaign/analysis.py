@@ -12,7 +12,12 @@ from pathlib import Path
 from typing import Any, Final
 
 import cosmic.autonomy.bending
-from cosmic.autonomy.bending.fit import assess_campaign, in_time, measure_fibre
+from cosmic.autonomy.bending.fit import (
+    assess_campaign,
+    half_width_percent,
+    in_time,
+    measure_fibre,
+)
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.standards import ForceScale, StandardReading
@@ -376,7 +381,7 @@ def _change(record: FibreRecord, now: BendingResult) -> Change | None:
             now.ei_n_m2,
             trusted_before=False,
             trusted_now=now.trusted,
-            half_now_percent=_half_percent(now),
+            half_now_percent=half_width_percent(now),
         )
     pairs = (
         (before.ei_n_m2, now.ei_n_m2),
@@ -393,13 +398,9 @@ def _change(record: FibreRecord, now: BendingResult) -> Change | None:
         now.ei_n_m2,
         trusted_before=before.trusted or said,
         trusted_now=now.trusted,
-        half_before_percent=_half_percent(before),
-        half_now_percent=_half_percent(now),
+        half_before_percent=half_width_percent(before),
+        half_now_percent=half_width_percent(now),
     )
-
-
-def _half_percent(result: BendingResult) -> float:
-    return 50.0 * (result.ei_high_n_m2 - result.ei_low_n_m2) / result.ei_n_m2
 
 
 def _same(one: float, other: float) -> bool:

@@ -144,6 +144,7 @@ class Campaign:
         self._recorded = 0
         self._unwritten = False
         self._stuck = 0
+        self._stepping = False
         self._standards = StandardSchedule(
             work.settings.standard.at if treatment.standard is not None else ()
         )
@@ -258,7 +259,7 @@ class Campaign:
         with self._changed:
             if self._phase is not CampaignPhase.RUNNING:
                 return
-            self._phase = CampaignPhase.PAUSING
+            self._phase, self._stepping = CampaignPhase.PAUSING, False
             run = self._run
         if run is not None:
             run.pause()
@@ -269,7 +270,7 @@ class Campaign:
         with self._changed:
             if self._phase not in (CampaignPhase.PAUSING, CampaignPhase.PAUSED):
                 return
-            self._phase = CampaignPhase.RUNNING
+            self._phase, self._stepping = CampaignPhase.RUNNING, False
             self._changed.notify_all()
             run = self._run
         if run is not None:
@@ -279,11 +280,14 @@ class Campaign:
     def step(self) -> None:
         """Carry out one operation, then rest; harmless when it is over."""
         with self._changed:
-            if self._phase in OVER or self._run is None or self._run.over:
+            run = None if self._run is None or self._run.over else self._run
+            if self._phase in OVER or (run is None and self._phase is not CampaignPhase.PAUSED):
                 return
             self._phase = CampaignPhase.PAUSING
-            run = self._run
-        run.step()
+            self._stepping = run is None  # between two fibres: that of the next
+            self._changed.notify_all()
+        if run is not None:
+            run.step()
 
     def confirm_plate(self) -> None:
         """Say that the plate is there which `request` asks for.
@@ -344,18 +348,28 @@ class Campaign:
             self._policy.report(exc, f"campaign {self.recipe.name!r}")
             failed, self._end_reason = True, f"program error: {exc}"
         finally:
-            self._leave(failed=failed)
-            leading.close()
+            try:
+                self._leave(failed=failed)
+            finally:
+                leading.close()
 
     def _leave(self, *, failed: bool) -> None:
-        self.work.close()
+        """Close all and come to the end, whatever fails on the way."""
+        kept = False
         try:
+            self.work.close()
             self._recorder.close(self._end_reason)
             self._analyse()
+            kept = True
         except CosmicError as exc:
-            failed, self._end_reason = True, f"{self._end_reason}; {exc}"
+            failed, kept, self._end_reason = True, True, f"{self._end_reason}; {exc}"
         finally:
             self.store.close()
+            if not kept:
+                self._end_reason = f"{self._end_reason}; program error at its end"
+            self._be_over(failed=failed or not kept)
+
+    def _be_over(self, *, failed: bool) -> None:
         end = CampaignPhase.ENDED if self._reached else CampaignPhase.STOPPED
         log = logger.error if failed else logger.info if self._reached else logger.warning
         log("campaign %s: %s", self.recipe.name, self._end_reason)
@@ -365,14 +379,20 @@ class Campaign:
 
     def _analyse(self) -> None:
         """Put final values into the record, and see whether all is there that was asked for."""
+        good = self.progress.good
         analysis = finish(self.store)
         self._recorder.read_again()
         if self._treatment.standard is not None and not (analysis and analysis.scale.verified):
             self._shortfall = "the standard did not verify the scale of the force"
         elif self._reached and not self._rule.reason(self.progress):
+            now = self.progress
             self._shortfall = (
-                f"by the final analysis {self.progress.good} fibres are good, fewer than the "
-                "campaign had come to itself"
+                f"by the final analysis {now.good} fibres are good, fewer than the campaign had "
+                "come to itself"
+                if now.good < good
+                else "by the final analysis the mean stiffness is known to "
+                f"+/-{now.mean.precision_percent:.1f} %, less well than the campaign had come to "
+                "itself"
             )
 
     def _treat_all(self) -> str:
@@ -584,7 +604,12 @@ class Campaign:
             if pausing and run is not None and run.state is RunState.PAUSED:
                 self._phase = CampaignPhase.PAUSED
         if pausing and run is not None and run.state is RunState.RUNNING:
-            run.pause()  # it was wanted while the run had not begun
+            # It was wanted while the run had not begun.
+            stepping, self._stepping = self._stepping, False
+            if stepping:
+                run.step()
+            else:
+                run.pause()
         self._publish()
 
     # Recording

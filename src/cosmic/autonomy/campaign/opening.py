@@ -195,6 +195,12 @@ def _check_same(info: CampaignInfo, recipe: Recipe, folder: Path, host: Campaign
             f"{folder} holds a campaign by another recipe than {recipe.path}: resume with "
             "that recipe, or name another folder"
         )
+    if (info.hardware == TWIN) is not (host.hardware == TWIN):
+        raise CampaignError(
+            f"{folder} holds a campaign on {_platform(info.hardware)}, and this is "
+            f"{_platform(host.hardware)}: simulated and real fibres do not go into one record. "
+            "Name another folder"
+        )
     if info.hardware == host.hardware == TWIN and info.seed != host.seed:
         raise CampaignError(
             f"{folder} holds a campaign on a twin with seed {info.seed}, and this one has seed "
@@ -207,6 +213,10 @@ def _check_same(info: CampaignInfo, recipe: Recipe, folder: Path, host: Campaign
             f"{folder} holds a campaign in the {info.world} world of the twin, and this one is "
             f"{host.world}. Resume with --world {info.world}, or name another folder"
         )
+
+
+def _platform(hardware: str) -> str:
+    return f"the {TWIN}" if hardware == TWIN else f"the platform {hardware}"
 
 
 def recorded(folder: Path) -> CampaignInfo | None:

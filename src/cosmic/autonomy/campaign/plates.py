@@ -1,21 +1,31 @@
 """Which plate of a campaign is on the table, and whether another is to be put there."""
 
+import logging
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
 from cosmic.autonomy.campaign.records import CampaignError, FibreRecord
-from cosmic.autonomy.campaign.store import CampaignStore, write_whole
+from cosmic.autonomy.campaign.store import CampaignStore, is_written, write_whole
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.plate_change import PlateByPerson, PlateHandler
 from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import NotAvailable
+from cosmic.frame.operation import Task
+
+logger = logging.getLogger(__name__)
 
 MOST_EMPTY: Final = 2
 """Plates in a row without any fibre that was begun with: then a person is to look."""
 
 CONFIRMED: Final = "plate.confirmed"
 """File in a campaign's folder by which another program says that a plate is there."""
+
+LOOK_WALL_S: Final = 0.2
+"""How often it is looked for."""
 
 PlateChangeProcedure = Callable[[PlateHandler, int], Procedure[HandlingContext]]
 """`build(handler, plate)` returns the procedure that has a plate put on the table."""
@@ -27,11 +37,16 @@ def confirm(folder: Path) -> int:
     Raises
     ------
     CampaignError
-        No plate was asked for, or it cannot be written.
+        No plate was asked for, no program carries the campaign out, or it cannot be written.
     """
     changes = CampaignReader(folder).plate_changes()
     if not changes or changes[-1].over:
         raise CampaignError(f"{folder}: no plate is waited for")
+    if not is_written(folder):
+        raise CampaignError(
+            f"{folder}: no program carries this campaign out now. Start it again in this folder: "
+            f"it asks for plate {changes[-1].plate} anew"
+        )
     write_whole(folder / CONFIRMED, b"")
     return changes[-1].plate
 
@@ -43,6 +58,62 @@ def confirmed(folder: Path) -> bool:
     except FileNotFoundError:
         return False
     return True
+
+
+class _ConfirmedAnywhere:
+    """Asks a person for a plate, who confirms it to this program or to another one.
+
+    Parameters
+    ----------
+    by : PlateByPerson
+        Who asks.
+    folder : Path
+        Of the campaign, where another program leaves word.
+    """
+
+    def __init__(self, by: PlateByPerson, folder: Path) -> None:
+        self.name = by.name
+        self.put, self.restore = by.put, by.restore
+        self._by, self._folder = by, folder
+
+    def change(self, plate: int) -> "_PlateAwaited":
+        """Ask for a plate; what is returned ends once somebody says that it is there."""
+        return _PlateAwaited(self._by.change(plate), self._taken(plate))
+
+    def _taken(self, plate: int) -> Callable[[], None]:
+        def take() -> None:
+            if confirmed(self._folder):
+                try:
+                    self._by.put(plate)
+                except NotAvailable as exc:
+                    logger.warning("plate %d was confirmed, and is not there: %s", plate, exc)
+
+        return take
+
+
+class _PlateAwaited:
+    """What ends when the plate is there that was asked for."""
+
+    def __init__(self, asked: Task, take: Callable[[], None]) -> None:
+        self._asked, self._take = asked, take
+        self._next_wall_s = -math.inf
+        self.add_callback = asked.add_callback
+
+    @property
+    def done(self) -> bool:
+        """It is there, or is wanted no longer."""
+        if not self._asked.done and WALL.now_s() >= self._next_wall_s:
+            self._next_wall_s = WALL.now_s() + LOOK_WALL_S
+            self._take()
+        return self._asked.done
+
+    def wait(self, timeout_s: float | None = None) -> object:
+        """Wait for it, and raise what it failed with."""
+        return self._asked.wait(timeout_s)
+
+    def cancel(self) -> None:
+        """Want it no longer."""
+        self._asked.cancel()
 
 
 class CampaignPlates:
@@ -118,9 +189,13 @@ class CampaignPlates:
 
     def change(self, store: CampaignStore, time_s: float) -> Procedure[HandlingContext]:
         """Note that the next plate is asked for, and return the procedure that has it put there."""
+        confirmed(store.folder)  # of an earlier plate: nobody has put this one there yet
         store.begin_plate(self._next, time_s=time_s, by=self._handler.name)
         self._pending = True
-        return self._build(self._handler, self._next)
+        handler: PlateHandler = self._handler
+        if isinstance(handler, PlateByPerson):
+            handler = _ConfirmedAnywhere(handler, store.folder)
+        return self._build(handler, self._next)
 
     def there(self, store: CampaignStore, time_s: float) -> None:
         """Note that it is there."""

@@ -213,7 +213,7 @@ def shipped_recipes() -> dict[str, Path]:
 
 
 def _found(path: Path) -> Path:
-    if path.suffix or path.exists() or path.parent != Path():
+    if path.suffix or path.is_file() or path.parent != Path():
         return path
     shipped = shipped_recipes()
     if path.name not in shipped:

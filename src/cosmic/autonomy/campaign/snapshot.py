@@ -277,10 +277,17 @@ def span_curves(record: FibreRecord, *, most_points: int | None = None) -> tuple
     fits = (*fits, *[None] * (len(record.spans) - len(fits)))
     used = () if result is None else result.used
     curves = [
-        _curve(span, fit, used=number in used, most_points=most_points)
+        _curve(
+            span, fit if _is_of(span, fit) else None, used=number in used, most_points=most_points
+        )
         for number, (span, fit) in enumerate(zip(record.spans, fits, strict=False))
     ]
     return tuple(each for each in curves if each is not None)
+
+
+def _is_of(span: Span, fit: SpanFit | None) -> bool:
+    """Return whether a fit is of these points: earlier programs kept those of a later push."""
+    return fit is not None and len(fit.fitted_un) == len(span.probe_um)
 
 
 def _curve(

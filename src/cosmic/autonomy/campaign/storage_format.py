@@ -134,6 +134,12 @@ ADDED: Final = {
 }
 """Columns that a campaign begun with an earlier program does not have."""
 
+
+def raw_file(fibre: int) -> str:
+    """Return where the raw file of a fibre lies in the folder of its campaign."""
+    return f"{FIBRES}/{fibre:05d}.h5"
+
+
 Cell = str | int | float | bytes | None
 Row = Mapping[str, Cell]
 

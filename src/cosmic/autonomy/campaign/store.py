@@ -5,7 +5,7 @@ import json
 import math
 import sqlite3
 from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from datetime import datetime
 from pathlib import Path, PurePosixPath
 from threading import RLock
@@ -43,6 +43,7 @@ from cosmic.autonomy.campaign.storage_format import (
     image_row,
     insert,
     operation_row,
+    raw_file,
     result_row,
     span_row,
     statements,
@@ -104,26 +105,38 @@ class FolderLock:
     Raises
     ------
     CampaignError
-        Another process, or another store of this one, has it.
+        Another process, or another store of this one, has it; or it cannot be written there.
     """
 
     def __init__(self, folder: Path) -> None:
-        self._connection = sqlite3.connect(
-            folder / LOCK, timeout=0.0, isolation_level=None, check_same_thread=False
-        )
+        try:
+            self._connection = sqlite3.connect(
+                folder / LOCK, timeout=0.0, isolation_level=None, check_same_thread=False
+            )
+        except sqlite3.Error as exc:
+            raise _no_lock(folder, exc) from exc
         try:
             self._connection.execute("PRAGMA journal_mode = MEMORY")
             self._connection.execute("BEGIN EXCLUSIVE")
         except sqlite3.Error as exc:
             self._connection.close()
-            raise CampaignError(
-                f"{folder}: a campaign is already being written there ({exc}): "
-                "wait for its end, or name another folder"
-            ) from exc
+            raise _no_lock(folder, exc) from exc
 
     def release(self) -> None:
         """Let others write."""
         self._connection.close()
+
+
+def _no_lock(folder: Path, error: sqlite3.Error) -> CampaignError:
+    if error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
+        return CampaignError(
+            f"{folder}: a campaign is already being written there ({error}): "
+            "wait for its end, or name another folder"
+        )
+    return CampaignError(
+        f"{folder}: {LOCK} cannot be written there ({error}): see who may write in it, or name "
+        "another folder"
+    )
 
 
 def is_written(folder: Path) -> bool:
@@ -220,7 +233,6 @@ def _opened(file: Path) -> sqlite3.Connection:
 def _lay_out(file: Path, info: CampaignInfo) -> None:
     """Make the tables under another name, so that there is a whole database or none."""
     part = file.with_name(file.name + PART)
-    part.unlink(missing_ok=True)
     row: Row = {
         "one": 1,
         "name": info.name,
@@ -237,22 +249,21 @@ def _lay_out(file: Path, info: CampaignInfo) -> None:
         "world": info.world,
         "versions_json": json.dumps(dict(info.versions)),
     }
-    connection = sqlite3.connect(part, isolation_level=None)
     try:
-        connection.execute("BEGIN")
-        for statement in statements(TABLES + LATER_TABLES):
-            connection.execute(statement)
-        insert(connection, "campaign", row)
-        connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
-        connection.execute("COMMIT")
-    except sqlite3.Error as exc:
+        part.unlink(missing_ok=True)
+        with closing(sqlite3.connect(part, isolation_level=None)) as connection:
+            connection.execute("BEGIN")
+            for statement in statements(TABLES + LATER_TABLES):
+                connection.execute(statement)
+            insert(connection, "campaign", row)
+            connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+            connection.execute("COMMIT")
+        part.replace(file)
+    except (sqlite3.Error, OSError) as exc:
         raise _failure(file, exc) from exc
-    finally:
-        connection.close()
-    part.replace(file)
 
 
-def _failure(file: Path, error: sqlite3.Error) -> NotWrittenError:
+def _failure(file: Path, error: sqlite3.Error | OSError) -> NotWrittenError:
     return NotWrittenError(
         f"{file} cannot be written: {error}. Completed fibres are saved: make room, and "
         "start the campaign again in the same folder"
@@ -492,14 +503,13 @@ class CampaignStore:
         with self._connection.guard:
             with self._connection.transaction() as connection:
                 self._refuse_unless_running(connection, record.number)
-            name = f"{record.number:05d}"
-            curves = PurePosixPath(FIBRES, f"{name}.h5")
+            curves = PurePosixPath(raw_file(record.number))
             content = curves_file(record)
             write_whole(self.folder / curves, content)
             row = fibre_row(record, str(curves))
             row["file_sha256"] = hashlib.sha256(content).hexdigest()
             images = [
-                self._write_image(image, PurePosixPath(FIBRES, f"{name}-{order:02d}.png"))
+                self._write_image(image, curves.with_name(f"{curves.stem}-{order:02d}.png"))
                 for order, image in enumerate(record.images)
             ]
             write_through(self.folder / FIBRES)

@@ -34,6 +34,7 @@ from cosmic.autonomy.campaign.storage_format import (
     Row,
     fibre_record,
     number,
+    raw_file,
     read_curves,
     read_fitted,
     region_px,
@@ -219,11 +220,17 @@ class CampaignReader:
         }
 
     def unfinished_files(self) -> tuple[str, ...]:
-        """Return raw files of fibres whose treatment was cut off: they have no value."""
+        """Return raw files of fibres whose treatment was cut off: they have no value.
+
+        Also where they would be of fibres that have none in the record: a file is written before
+        the record says so, and the end may come between.
+        """
         finished = {each.value for each in FINISHED}
         rows = self._rows("SELECT * FROM fibre")
         return tuple(
-            str(row["file"]) for row in rows if row["file"] and row["outcome"] not in finished
+            str(row["file"]) or raw_file(int(number(row["number"])))
+            for row in rows
+            if row["outcome"] not in finished
         )
 
     def run_records(self) -> dict[int, str]:

@@ -82,7 +82,8 @@ class LoopParts:
         if name in self.channels:
             return self.channel(name, settings, limits)
         if name in self._mico:
-            return PositionSource(self._mico, name, stale_s=settings.stale_s)
+            low, high = limits
+            return PositionSource(self._mico, name, stale_s=settings.stale_s, low=low, high=high)
         known = [*self.channels, *self._mico.names]
         raise ConfigError(f"there is no channel or axis {name!r}; there are {', '.join(known)}")
 

@@ -150,25 +150,45 @@ class ChannelSource(Source):
         self._newest = Sample(float(values[-1]), WALL.now_s())
         beyond = np.flatnonzero(~((values > self._low) & (values < self._high)))
         if beyond.size:
-            self._report(self._crossed(float(values[beyond[0]])))
+            self._report(_crossed(self, float(values[beyond[0]]), (self._low, self._high)))
 
     def _report(self, error: CosmicError) -> None:
         if self._on_limit is not None:
             self._on_limit(error)
 
-    def _crossed(self, value: float) -> LimitError:
-        limit = self._low if value <= self._low else self._high
-        text = f"{self._channel} reached {value:.4g} {self._unit}, the loop's limit is {limit:g}"
-        return LimitError(refuse(Reason.LIMIT, text, value=value, limit=limit, unit=self._unit))
+
+def _crossed(source: Source, value: float, limits: tuple[float, float]) -> LimitError:
+    low, high = limits
+    limit = low if value <= low else high
+    text = f"{source.name} reached {value:.4g} {source.unit}, the loop's limit is {limit:g}"
+    return LimitError(refuse(Reason.LIMIT, text, value=value, limit=limit, unit=source.unit))
 
 
 class PositionSource(Source):
-    """The position of an axis, in gate coordinates; about 20 values a second while it moves."""
+    """The position of an axis, in gate coordinates; about 20 values a second while it moves.
 
-    def __init__(self, mico: Mico, axis: str, *, stale_s: float) -> None:
+    Parameters
+    ----------
+    low, high : float
+        Limits: a position that does not lie between them ends the loop; the gate has its own.
+    """
+
+    def __init__(
+        self,
+        mico: Mico,
+        axis: str,
+        *,
+        stale_s: float,
+        low: float = -math.inf,
+        high: float = math.inf,
+    ) -> None:
+        if not low < high:
+            raise ConfigError(f"{axis}: the low limit must lie below the high one")
         self._axis = mico[axis]
         settings = mico.settings.watch
         self._stale_s = max(stale_s, IDLE_POLLS * settings.idle_poll_s)
+        self._low, self._high = low, high
+        self._on_limit: Callable[[CosmicError], None] | None = None
 
     @property
     @override
@@ -192,13 +212,16 @@ class PositionSource(Source):
 
     @override
     def begin(self, on_limit: Callable[[CosmicError], None]) -> None:
-        """Nothing to do: MiCo reads positions anyway, and the gate knows the limits."""
+        """Remember whom to tell; MiCo reads positions anyway."""
+        self._on_limit = on_limit
 
     @override
     def newest(self) -> Sample | None:
         state = self._axis.details
         if state.position is None:
             return None
+        if not self._low < state.position < self._high and self._on_limit is not None:
+            self._on_limit(_crossed(self, state.position, (self._low, self._high)))
         return Sample(state.position, state.read_wall_s)
 
     @override

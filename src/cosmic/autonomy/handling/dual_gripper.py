@@ -113,9 +113,11 @@ class CarryInTurn(Carry):
                 continue
             x, _ = other.tip_now(other.gripper)
             if not (behind_um(other) - x) * other.jaws.forward > -NEAR_UM:
-                raise OperationFailed(
+                failure = OperationFailed(
                     OBSTRUCTED, f"{other.gripper.shown} still holds a fibre near the probe"
                 )
+                work.failures.append((self.name, failure))  # what the fibre is given up for
+                raise failure
 
     @override
     def steps(self, work: HandlingContext) -> Steps:

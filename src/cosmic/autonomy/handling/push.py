@@ -500,13 +500,25 @@ GUESSED_FROM: Final = 2
 
 
 class PushSpans(FibreOperation):
-    """All spans of one grasp, the longest first; each one makes the plan of the next better."""
+    """All spans of one grasp, the longest first; each one makes the plan of the next better.
+
+    Of a fibre that has a result already the spans of that are kept until there are all of the next.
+    """
 
     name = "push the spans"
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
-        fibre = work.held_fibre()
+        fibre, done = work.held_fibre(), False
+        earlier = () if fibre.bending is None else tuple(fibre.spans)
+        try:
+            yield from self._pushed(work, fibre)
+            fibre.bending, fibre.measured, done = None, None, True
+        finally:
+            if earlier and not done:
+                fibre.spans[:] = earlier
+
+    def _pushed(self, work: HandlingContext, fibre: HeldFibre) -> Steps:
         fibre.spans.clear()
         fibre.contacts.clear()
         fibre.zero_un = None

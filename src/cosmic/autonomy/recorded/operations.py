@@ -13,7 +13,7 @@ import numpy as np
 from typing_extensions import override
 
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
-from cosmic.autonomy.handling.force import ForceMean
+from cosmic.autonomy.handling.force import ForceMean, ForceWatch
 from cosmic.autonomy.handling.jaws import move_jaws
 from cosmic.autonomy.handling.marked import MarkedFibre
 from cosmic.autonomy.handling.prepare import make_safe
@@ -247,11 +247,18 @@ class WaitingForForce(_OneStep):
     def steps(self, work: HandlingContext) -> Steps:
         step = self._step
         assert isinstance(step, WaitForForceStep)
+        forces = ForceWatch(work.daqco, step.channel, work.clock)
+        if (unit := work.daqco.units[step.channel]) != "uN":
+            raise OperationFailed("no force", f"{step.channel} is measured in {unit}, not in uN")
         until_s = work.clock.now_s() + step.timeout_s
-        while work.clock.now_s() < until_s:
-            mean = yield work.forces.wanted(LOOK_S)
-            if isinstance(mean, ForceMean) and abs(mean.mean_un) >= step.force_un:
-                return
+        forces.open()
+        try:
+            while work.clock.now_s() < until_s:
+                mean = yield forces.wanted(LOOK_S)
+                if isinstance(mean, ForceMean) and abs(mean.mean_un) >= step.force_un:
+                    return
+        finally:
+            forces.close()
         raise OperationFailed(
             "force not reached", f"{step.force_un:g} µN was not reached in {step.timeout_s:g} s"
         )

@@ -3,10 +3,10 @@
 import json
 import tomllib
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, Self
 
 import tomlkit
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 from typing_extensions import override
 
 from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
@@ -31,6 +31,13 @@ class RecordedStep(StrictModel):
     """
 
     ask: dict[str, str] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _asks_for_numbers(self) -> Self:
+        for key in self.ask:
+            if not isinstance(getattr(self, key, None), int | float):
+                raise ValueError(f"ask: {key!r} is no number of this step")
+        return self
 
     @property
     def words(self) -> str:
@@ -257,6 +264,8 @@ def load_recorded(path: Path) -> RecordedProcedure:
 def _checked(data: dict[str, object], where: str) -> RecordedProcedure:
     try:
         return RecordedProcedure.model_validate_json(json.dumps(data))  # tables know no tuples
+    except TypeError as exc:  # a date
+        raise ConfigError(f"{where}: {exc}") from exc
     except ValidationError as exc:
         lines = [
             f"{where}: {'.'.join(str(part) for part in each['loc'])}: {each['msg']}"
@@ -265,7 +274,7 @@ def _checked(data: dict[str, object], where: str) -> RecordedProcedure:
         raise ConfigError("\n".join(lines)) from exc
 
 
-_SCRIPT: Final = '''"""{name}: recorded with CoSMic.
+_SCRIPT: Final = '''"""{title}: recorded with CoSMic.
 
 python THIS_FILE replays it on the platform. A procedure that begins with a fibre takes the first
 that is certain.
@@ -307,15 +316,20 @@ def python_of(procedure: RecordedProcedure) -> str:
             if key != "kind" or isinstance(each, WaitForOperatorStep)
         }
         fields = ", ".join(f"{key}={_source(value)}" for key, value in given.items())
-        lines.append(f"        {type(each).__name__}({fields}),  # {each.words}")
+        lines.append(f"        {type(each).__name__}({fields}),  # {_in_one_line(each.words)}")
     uses = any(isinstance(each, OperationStep) for each in procedure.step)
     more = "from cosmic.autonomy.shipped.fibre_handling import SingleOperation\n" if uses else ""
     return _SCRIPT.format(
+        title=_in_one_line(procedure.name).replace("\\", r"\\").replace('"', r"\""),
         name=procedure.name,
         imports="\n".join(f"    {kind}," for kind in kinds),
         further=more,
         steps="\n".join(lines),
     )
+
+
+def _in_one_line(text: str) -> str:
+    return " ".join(text.split())
 
 
 def _source(value: object) -> str:

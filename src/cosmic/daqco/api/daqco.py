@@ -340,6 +340,8 @@ class Daqco(Declared):
     def tare(self, channel: str) -> float:
         """Call the present value of a channel zero, by another scale; returns what it was.
 
+        A scale that other channels have too stays theirs: this one gets one of its own.
+
         Raises
         ------
         NotAvailable
@@ -348,10 +350,15 @@ class Daqco(Declared):
         chunk = self.latest_chunk
         if chunk is None or channel not in chunk.channels:
             raise NotAvailable(self.problem or f"{channel}: nothing has been acquired yet")
-        value = float(chunk.values[chunk.channels.index(channel)].mean())
+        # By the scale in force: the newest samples may have come before a tare just now.
         scale = self.scales[channel]
+        value = float(scale.apply(chunk.volts[chunk.channels.index(channel)]).mean())
         first, *rest = scale.coefficients
-        self.set_scale(channel, Scale(scale.name, scale.unit, (first - value, *rest)))
+        name = scale.name
+        taken = {each.scale for each in self.settings.channel if each.name != channel}
+        while name in taken:
+            name = f"{name} ({channel})"
+        self.set_scale(channel, Scale(name, scale.unit, (first - value, *rest)))
         return value
 
     # Recording

@@ -7,7 +7,7 @@ its files end.
 import csv
 import os
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Final, Protocol
 
@@ -163,7 +163,8 @@ def _replacing(path: Path) -> Iterator[Path]:
             "Make room, or choose another directory"
         ) from exc
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # why it could not be written was told above
+            part.unlink(missing_ok=True)
 
 
 def _export(
@@ -223,7 +224,13 @@ def _check_free(recording: Recording, path: Path, *, overwrite: bool) -> None:
     _check_other(recording, path)
     if not path.parent.is_dir():
         raise RecordingError(f"directory {path.parent} does not exist; create it or choose another")
-    if path.exists() and not overwrite:
+    try:
+        there = path.exists()
+    except OSError as exc:
+        raise RecordingError(
+            f"{path}: is no name of a file ({exc.strerror}); choose another"
+        ) from exc
+    if there and not overwrite:
         raise RecordingExistsError(
             f"{path}: there is such a file; choose another name, or say that it may be replaced"
         )

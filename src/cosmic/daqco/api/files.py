@@ -1,6 +1,7 @@
 """Where recordings go on this computer's disk, and which of it other stations may use."""
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -35,8 +36,11 @@ def named_file(base: str, option: NameOption, directory: Path, when: datetime) -
 
 def recordings_in(directory: Path) -> tuple[Path, ...]:
     """Return the newest recordings in a directory, newest first; raises `RecordingError`."""
+    dated: list[tuple[float, Path]] = []
     try:
-        dated = [(each.stat().st_mtime, each) for each in directory.glob(f"*{SUFFIX}")]
+        for each in directory.glob(f"*{SUFFIX}"):
+            with suppress(FileNotFoundError):  # taken away meanwhile, or a link to nowhere
+                dated.append((each.stat().st_mtime, each))
     except OSError as exc:
         raise RecordingError(f"{directory}: {exc}") from exc
     return tuple(each for _, each in sorted(dated, reverse=True)[:MOST_LISTED])

@@ -271,12 +271,14 @@ class OpenRecordings:
         """
         note = self._folder / f"{os.getpid()}-{uuid4().hex[:12]}{_NOTE}"
         try:
+            where = str(path.absolute())
+            where.encode("utf-8")  # a folder of another system may have a name that is no text
             self._folder.mkdir(parents=True, exist_ok=True)
-            write_whole(note, toml_lines({"recording": str(path.absolute())}))
+            write_whole(note, toml_lines({"recording": where}))
             for old in self._notes()[MOST_NOTES:]:
                 old.unlink(missing_ok=True)
-        except OSError as exc:
-            logger.warning("%s: it is not noted that %s is recorded (%s)", note, path, exc)
+        except (OSError, UnicodeError) as exc:
+            logger.warning("%s: it is not noted that %r is recorded (%s)", note, str(path), exc)
             return None
         return note
 

@@ -184,7 +184,12 @@ class LimitGuard:
                 if (limit.armed if slow else limit.suspended)
             ]
             for limit in changed:
-                self._limits[limit.channel] = replace(limit, armed=not slow, suspended=slow)
+                # One that was acknowledged meanwhile is looked at as one that is new: what is still
+                # beyond it trips it again.
+                beyond = limit.beyond and limit.tripped
+                self._limits[limit.channel] = replace(
+                    limit, armed=not slow, suspended=slow, beyond=limit.beyond if slow else beyond
+                )
         for limit in changed:
             if slow:
                 why = (

@@ -210,6 +210,8 @@ class RecordingFile:
     def _created(self, *, overwrite: bool) -> h5py.File:
         path = self._path
         try:
+            if overwrite and path.exists():
+                self._check_replaceable()
             return h5py.File(path, "w" if overwrite else "x", libver=("v110", "v110"))
         except FileExistsError:
             raise RecordingExistsError(
@@ -220,6 +222,15 @@ class RecordingFile:
                 f"{path}: cannot be created ({form.reason(exc)}); close what reads it, "
                 "or choose another name or directory"
             ) from exc
+
+    def _check_replaceable(self) -> None:
+        """Refuse what somebody records to, or reads: HDF5 empties a file before it asks for it."""
+        with FileHold(self._path, alone=True) as hold:
+            if not hold.held:
+                raise RecordingError(
+                    f"{self._path}: cannot be created: the file of that name is in use. Close what "
+                    "has it open, or choose another name or directory"
+                )
 
     def _begin(self) -> None:
         try:

@@ -158,8 +158,8 @@ def text_type(text_bytes: int) -> "np.dtype[np.bytes_]":
 
 
 def encoded(text: str, text_bytes: int) -> bytes:
-    """Return UTF-8 that fits, cut between two letters where it must be."""
-    data = text.encode("utf-8")
+    """Return UTF-8 that fits, cut between two letters where it must be; "?" for half a letter."""
+    data = text.encode("utf-8", "replace")
     if len(data) <= text_bytes:
         return data
     return data[: text_bytes - 3].decode("utf-8", "ignore").encode("utf-8") + "…".encode()

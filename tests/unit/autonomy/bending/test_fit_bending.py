@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -354,3 +355,28 @@ def test_the_fitted_curve_runs_through_the_points() -> None:
         away = span.force_un - fit.fitted_un
         assert float(np.nanstd(away)) < 0.02 * fit.peak_un + 0.1
         assert fit.chi2 / fit.freedom < 2.0
+
+
+def replaced(spans: list[Span], probe_um: Callable[[Span], np.ndarray]) -> list[Span]:
+    return [dataclasses.replace(each, probe_um=probe_um(each)) for each in spans]
+
+
+def test_a_probe_whose_position_is_stuck_is_named() -> None:
+    stuck = replaced(pushed(rig()), lambda span: np.full_like(span.probe_um, 12.0))
+    with pytest.raises(BendingError, match="the probe stood at one position all the way out"):
+        fit_bending(stuck)
+
+
+def test_a_position_that_is_stuck_on_the_way_back_is_named() -> None:
+    top = replaced(
+        pushed(rig()), lambda span: np.where(span.loading, span.probe_um, span.probe_um.max())
+    )
+    with pytest.raises(BendingError, match="all the way back"):
+        fit_bending(top)
+
+
+def test_forces_of_no_fibre_have_no_stiffness_and_are_no_defect() -> None:
+    backwards = replaced(pushed(rig()), lambda span: -span.probe_um)
+    found = fit_bending(backwards)
+    assert not found.trusted
+    assert found.reasons

@@ -83,3 +83,8 @@ def test_a_fibre_too_short_is_refused_with_what_is_needed() -> None:
 def test_a_guess_that_is_no_stiffness_is_refused(guess: float) -> None:
     with pytest.raises(BendingError, match="no bending stiffness to plan with"):
         plan_spans(1000.0, guess)
+
+
+def test_a_free_length_that_is_no_number_is_refused() -> None:
+    with pytest.raises(BendingError, match="too short"):
+        plan_spans(float("nan"))

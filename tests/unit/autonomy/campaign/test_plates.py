@@ -11,9 +11,11 @@ from cosmic.autonomy.campaign.plates import CampaignPlates, confirm, confirmed
 from cosmic.autonomy.campaign.records import CampaignError
 from cosmic.autonomy.campaign.stop_rule import PLATE, StandardSchedule
 from cosmic.autonomy.campaign.store import CampaignStore
-from cosmic.autonomy.handling.plate_change import PlateByPerson
+from cosmic.autonomy.handling.plate_change import PlateByPerson, PlateHandler
+from cosmic.autonomy.procedures.operation import Awaited
 from cosmic.frame.errors import NotAvailable, OperationCancelled
 from unit.autonomy.campaign.sample_records import INFO, failed
+from unit.mico.rigs import wait_until
 
 
 @pytest.fixture
@@ -83,6 +85,35 @@ def test_another_program_confirms_a_plate_only_where_one_is_waited_for(
     store.begin_plate(2, time_s=10.0, by="person")
     assert confirm(store.folder) == 2
     assert [confirmed(store.folder), confirmed(store.folder)] == [True, False]
+
+
+def test_a_plate_is_not_confirmed_to_a_campaign_that_nobody_carries_out(tmp_path: Path) -> None:
+    with CampaignStore.create(tmp_path, INFO) as store:
+        store.begin_plate(2, time_s=10.0, by="person")
+    with pytest.raises(CampaignError, match="no program carries this campaign out now"):
+        confirm(tmp_path)
+    assert not confirmed(tmp_path)
+
+
+def test_what_another_program_says_goes_for_one_plate(store: CampaignStore) -> None:
+    asked: list[Awaited] = []
+
+    def build(handler: PlateHandler, plate: int) -> Any:
+        asked.append(handler.change(plate))
+
+    person = PlateByPerson()
+    some = CampaignPlates(3, person, build)
+    some.change(store, 10.0)
+    person.put(2)  # in the window, and from a terminal as well
+    confirm(store.folder)
+    some.there(store, 20.0)
+    some.change(store, 30.0)
+    assert not asked[-1].done
+    assert "plate 3" in some.request
+    confirm(store.folder)
+    wait_until(lambda: asked[-1].done)
+    assert asked[-1].wait(0.0) is None
+    assert not confirmed(store.folder)
 
 
 def test_the_standard_is_due_on_each_further_plate_where_that_is_wanted() -> None:

@@ -73,6 +73,14 @@ def test_a_wrong_recipe_is_refused_with_file_key_and_reason(
         assert word in str(caught.value)
 
 
+def test_a_shipped_recipe_is_found_beside_a_folder_of_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "bend-test").mkdir()  # where its campaign is kept
+    monkeypatch.chdir(tmp_path)
+    assert load_recipe(Path("bend-test")).path == shipped_recipes()["bend-test"]
+
+
 def test_a_procedure_under_the_name_that_it_had_before_is_found(tmp_path: Path) -> None:
     path = written(tmp_path, 'procedure = "bend test with two hands"\n[stop]\ncount = 1\n')
     recipe = load_recipe(path, procedures=PARAMETERS)

@@ -233,3 +233,14 @@ def test_the_table_keeps_how_probable_it_is_that_a_fibre_is_whole(tmp_path: Path
 
 def test_records_and_vision_call_the_same_fibres_certain():
     assert CERTAIN == certainty.CERTAIN
+
+
+def test_spans_that_are_not_those_of_the_result_cost_no_report(tmp_path: Path) -> None:
+    with CampaignStore.create(tmp_path / "run", INFO) as store:
+        record = good(store.begin_fibre(time_s=1.0))
+        columns = ("probe_um", "force_un", "force_std_un", "time_s", "loading")
+        first = record.spans[0]
+        cut = replace(first, **{name: getattr(first, name)[:-5] for name in columns})
+        store.finish_fibre(replace(record, spans=(cut,)))
+        write_report(store, tmp_path / "run" / "report.html")
+    assert "Fibre 1" in (tmp_path / "run" / "report.html").read_text("utf-8")

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from cosmic.autonomy.bending.span import Freed
+from cosmic.autonomy.campaign.analysis import altered_files
 from cosmic.autonomy.campaign.recorder import Journal
 from cosmic.autonomy.campaign.records import (
     CalibrationNote,
@@ -24,7 +25,7 @@ from cosmic.autonomy.campaign.records import (
     Outcome,
     Pose,
 )
-from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store import LOCK, CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from unit.autonomy.campaign.sample_records import INFO, failed, good
 
@@ -352,3 +353,27 @@ def test_another_process_is_refused_until_the_first_is_gone(
     writers.to_the_end()
     with CampaignStore.open(tmp_path) as store:
         assert store.reader.info() == INFO
+
+
+def test_a_folder_whose_lock_cannot_be_written_is_not_said_to_be_in_use(tmp_path: Path) -> None:
+    CampaignStore.create(tmp_path, INFO).close()
+    (tmp_path / LOCK).unlink()
+    (tmp_path / LOCK).mkdir()
+    with pytest.raises(CampaignError, match="cannot be written there"):
+        CampaignStore.open(tmp_path)
+
+
+def test_a_folder_in_which_no_database_can_be_made_is_refused_by_name(tmp_path: Path) -> None:
+    (tmp_path / "campaign.sqlite.part").mkdir()
+    with pytest.raises(CampaignError, match="cannot be written"):
+        CampaignStore.create(tmp_path, INFO)
+
+
+def test_a_raw_file_written_just_before_the_end_is_no_stranger(tmp_path: Path) -> None:
+    with CampaignStore.create(tmp_path, INFO) as store:
+        number = store.begin_fibre(time_s=1.0)
+        (tmp_path / "fibres" / f"{number:05d}.h5").write_bytes(b"whole, and not in the record yet")
+    assert altered_files(CampaignReader(tmp_path)) == ()
+    with CampaignStore.open(tmp_path) as store:
+        store.interrupt_running()
+    assert altered_files(CampaignReader(tmp_path)) == ()

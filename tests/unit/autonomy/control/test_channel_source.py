@@ -1,14 +1,16 @@
 """What a loop measures is told to be gone, by its name."""
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
-from cosmic.autonomy.control.sources import ChannelSource
+from cosmic.autonomy.control.sources import ChannelSource, PositionSource
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.scale import Scale
-from cosmic.frame.errors import CosmicError
+from cosmic.frame.errors import ConfigError, CosmicError, LimitError
 
 SCALE = Scale("Probe", "uN", (0.0, 20.0))
 
@@ -25,6 +27,18 @@ class Daqco:
         return lambda: None
 
 
+class Mico:
+    """One axis, where a test has put it."""
+
+    settings = SimpleNamespace(watch=SimpleNamespace(idle_poll_s=1.0))
+
+    def __init__(self, axis: object) -> None:
+        self._axis = axis
+
+    def __getitem__(self, _name: str) -> object:
+        return self._axis
+
+
 def chunk(name: str) -> DataChunk:
     return DataChunk(0, 0.0, 1000.0, (name,), np.ones((1, 2)), (SCALE,))
 
@@ -39,3 +53,20 @@ def test_a_channel_that_was_renamed_ends_the_loop_with_its_name():
     daqco.put(chunk("push"))
     (error,) = errors
     assert "no channel force any more: renamed, or switched off" in str(error)
+
+
+def test_a_position_beyond_the_limits_of_a_loop_ends_it_as_a_force_does():
+    state = SimpleNamespace(position=0.0, read_wall_s=1.0)
+    mico: Any = Mico(SimpleNamespace(key="left.x", unit="um", details=state))
+    errors: list[CosmicError] = []
+    source = PositionSource(mico, "left.x", stale_s=1.0, low=-5.0, high=5.0)
+    source.begin(errors.append)
+    assert source.newest() is not None
+    assert not errors
+    state.position = 5.5
+    source.newest()
+    (error,) = errors
+    assert isinstance(error, LimitError)
+    assert "left.x reached 5.5 um, the loop's limit is 5" in str(error)
+    with pytest.raises(ConfigError, match="low limit"):
+        PositionSource(mico, "left.x", stale_s=1.0, low=5.0, high=-5.0)

@@ -20,6 +20,7 @@ from cosmic.autonomy.handling.dual_gripper import (
 )
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Jaws, PlateFrame, Reach
+from cosmic.autonomy.handling.put_away import NoteFailure
 from cosmic.autonomy.handling.settings import HandlingSettings, of_arm
 from cosmic.autonomy.handling.survey import NONE_LEFT, approaches_of
 from cosmic.autonomy.procedures.operation import OperationFailed
@@ -238,6 +239,23 @@ def test_nobody_comes_to_the_probe_while_the_other_still_holds_a_fibre_there(
             CarryInTurn().precondition(left)
         right.fibre.held = False
     CarryInTurn().precondition(left)
+
+
+def test_a_fibre_given_up_before_the_probe_is_noted_with_that_and_not_with_an_earlier_failure() -> (
+    None
+):
+    left, right = arms()
+    line = np.zeros((2, 2))
+    for arm in (left, right):
+        arm.fibre = HeldFibre(1, Reach(straight(0.0, 0.0), 0.0, line, (0.0, 0.0)), held=True)
+    right.tip_x_um = 250.0
+    left.failures.append(("close", OperationFailed("missed grasp", "mended by another try")))
+    with pytest.raises(OperationFailed):
+        CarryInTurn().precondition(left)
+    list(NoteFailure().run(left))
+    assert left.fibre is not None
+    assert left.fibre.failure is not None
+    assert left.fibre.failure.cause == "other gripper in the way"
 
 
 def test_jaws_know_which_way_they_point() -> None:

@@ -414,3 +414,36 @@ def test_a_limit_that_was_armed_before_is_as_it_was_after_the_push():
     carried_out(PushSpans().run(bench))
     assert bench.daqco.armed == [True, True, True]  # type: ignore[attr-defined]
     assert bench.daqco.limits[0].settings == mine
+
+
+@pytest.mark.parametrize("ending", ["not met", "aborted", "no force"])
+def test_a_second_push_that_fails_leaves_the_spans_that_the_result_stands_on(
+    ending: str, monkeypatch: pytest.MonkeyPatch
+):
+    bench = Bench(5e-11)
+    carried_out(PushSpans().run(bench))
+    fibre = bench.held_fibre()
+    before, fibre.bending = list(fibre.spans), fit_bending(fibre.spans)
+    steps = PushSpans().run(bench)
+    if ending == "aborted":
+        steps.send(next(steps).wait())  # type: ignore[union-attr]
+        steps.close()
+    else:
+        bench.there = False
+        if ending == "no force":
+            monkeypatch.setattr(push, "LOOKS", 0)
+        with pytest.raises(OperationFailed):
+            carried_out(steps)
+    assert fibre.spans == before
+    assert fibre.bending is not None
+
+
+def test_a_second_push_takes_the_place_of_the_first_with_its_result():
+    bench = Bench(5e-11)
+    carried_out(PushSpans().run(bench))
+    fibre = bench.held_fibre()
+    before, fibre.bending = list(fibre.spans), fit_bending(fibre.spans)
+    carried_out(PushSpans().run(bench))
+    assert len(fibre.spans) == 5
+    assert not any(each in before for each in fibre.spans)
+    assert fibre.bending is None

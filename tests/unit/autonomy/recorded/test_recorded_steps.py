@@ -59,6 +59,16 @@ def test_the_script_holds_the_same_procedure_and_begins_nothing_when_imported(
     assert "# Push to 50 µN" in file.read_text("utf-8")
 
 
+@pytest.mark.parametrize("name", ["C:\\new\\users", 'the """best"""', "two\nlines", '"µ"', "end\\"])
+def test_the_script_is_python_whatever_the_procedure_and_its_steps_are_called(
+    name: str, tmp_path: Path
+) -> None:
+    wait = WaitForOperatorStep(text="look at the tip\nthen go on")
+    procedure = RecordedProcedure(name=name, step=[wait])
+    procedure.save_python(tmp_path / "odd.py")
+    assert runpy.run_path(str(tmp_path / "odd.py"))["PROCEDURE"] == procedure
+
+
 def test_a_replay_asks_for_what_is_marked_and_takes_other_values() -> None:
     assert EVERYTHING.asked == {(7, "force_un"): ("Force, µN", 50.0)}
     changed = EVERYTHING.with_values({(7, "force_un"): 30.0})
@@ -75,6 +85,15 @@ def test_a_replay_asks_for_what_is_marked_and_takes_other_values() -> None:
         ('name = "a"\n[[step]]\nkind = "pause"\nseconds = -1\n', "seconds"),
         ('name = "a"\n[[step]]\nkind = "pause"\nseconds = 1\nhops = 2\n', "hops"),
         ("name = ", "Invalid value"),
+        ("name = 2026-01-01", "date"),
+        (
+            'name = "a"\n[[step]]\nkind = "record"\nname = "r"\nask = {name = "x"}\n',
+            "'name' is no num",
+        ),
+        (
+            'name = "a"\n[[step]]\nkind = "pause"\nseconds = 1.0\nask = {hops = "x"}\n',
+            "'hops' is no",
+        ),
     ],
 )
 def test_a_damaged_file_names_the_key(text: str, why: str, tmp_path: Path) -> None:
