@@ -4,6 +4,7 @@ import io
 import runpy
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -130,6 +131,28 @@ def test_one_recording_at_a_time_and_no_file_is_overwritten_unasked(
     with pytest.raises(RecordingError, match="does not exist"):
         mico.trajectories.record(tmp_path / "none" / "a.trajectory")
     assert mico.trajectories.recording is None
+
+
+@pytest.mark.parametrize("title", ["a\x07b", "x" * 600, "a # b", "\udc80"])
+def test_a_title_that_nobody_could_read_again_is_refused_before_anything_is_recorded(
+    mico: Mico, tmp_path: Path, title: str
+) -> None:
+    with pytest.raises(RecordingError, match="title"):
+        mico.trajectories.record(tmp_path / "a.trajectory", title=title)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_cannot_be_saved_leaves_the_file_that_was_there(mico: Mico, tmp_path: Path) -> None:
+    path = tmp_path / "a.trajectory"
+    mico.trajectories.save(written("left.x to 5 um\n"), path)
+    before = path.read_text(encoding="utf-8")
+    bad = replace(written("left.x to 5 um\n"), title="\udc80")
+    with pytest.raises(RecordingError):
+        mico.trajectories.save(bad, path, overwrite=True)
+    with pytest.raises(RecordingError):
+        mico.trajectories.save(bad, tmp_path / "b.trajectory")
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]
+    assert path.read_text(encoding="utf-8") == before
 
 
 class FullDisk(io.FileIO):
