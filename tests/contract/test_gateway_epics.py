@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Thread
+from threading import Event, Thread
 from typing import Any
 
 import pytest
@@ -20,9 +20,11 @@ from contract.station_rig import free_port, wait_until
 from cosmic.app.configuration.gateways import Doors, EpicsSettings, HttpSettings
 from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.epics import EpicsGateway
+from cosmic.app.gateways.session import GatewaySession
 from cosmic.frame.declaration import command, state
-from cosmic.frame.errors import ConfigError
+from cosmic.frame.errors import ConfigError, OperationCancelled
 from cosmic.frame.failure import Failure, FailurePolicy
+from cosmic.frame.network.caller import Access
 from cosmic.frame.network.host import Host
 from cosmic.frame.network.station import Station
 
@@ -274,6 +276,30 @@ def approvals() -> Iterator[Approvals]:
     made = Approvals(FailurePolicy())
     yield made
     made.close()
+
+
+def test_what_is_taken_back_after_its_approval_is_not_begun_any_more(approvals: Approvals) -> None:
+    station = Station("fibres", FailurePolicy())
+    host = Host("cabinet", Cabinet())
+    station.host("cabinet", host)
+    session = GatewaySession(station, "notebook", Access.MOVE, door="http")
+    go_on, begun = Event(), list[str]()
+    try:
+        order = session.order("cabinet", "drawers.move", {"target_um": 5.0}, ("left.x",))
+        before = approvals.ask("notebook", order, lambda: begun.append("before") or go_on.wait(10))
+        after = approvals.ask("notebook", order, lambda: begun.append("after"))
+        for asked in approvals.waiting:
+            approvals.approve(asked.number)
+        assert wait_until(lambda: begun == ["before"])
+        after.cancel()
+        go_on.set()
+        assert before.exception(10.0) is None
+        assert isinstance(after.exception(10.0), OperationCancelled)
+        assert begun == ["before"]
+    finally:
+        go_on.set()
+        session.close()
+        host.close()
 
 
 def test_what_moves_over_epics_waits_for_a_person(approvals: Approvals) -> None:

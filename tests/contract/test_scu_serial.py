@@ -151,6 +151,18 @@ def test_a_command_that_arrived_garbled_is_sent_again(rig, lines):
     assert lines.units[0].heard[3:] == ["MPA0P6.0H0"] * 3
 
 
+def test_a_movement_that_arrived_garbled_is_not_sent_again_after_a_stop(rig, lines):
+    lines.units[0].garbled = 1
+    rig.controller.move_to(AT, 5.0, "um", hold_s=0.0)
+    rig.controller.stop(AT)
+    rig.controller.move_to(OTHER, 7.0, "um", hold_s=0.0)
+    events(rig, 0)
+    assert lines.units[0].heard == ["MPA0P5.0H0", "S0", "MPA1P7.0H0"]
+    rig.controller.move_to(AT, 6.0, "um", hold_s=0.0)
+    events(rig, 0)
+    assert lines.units[0].heard[3:] == ["MPA0P6.0H0"]
+
+
 def test_a_movement_that_is_not_acknowledged_has_failed_for_nobody_knows(rig, lines):
     lines.units[0].deaf = {"MPA"}
     rig.controller.move_to(AT, 5.0, "um", hold_s=0.0)

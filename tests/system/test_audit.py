@@ -18,9 +18,10 @@ from cosmic.app.cli import main
 from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.session import GatewaySession
 from cosmic.app.platform import build_platform
-from cosmic.frame.audit import read_entries
+from cosmic.frame.audit import AuditEntry, AuditTrail, read_entries
 from cosmic.frame.declaration import command
 from cosmic.frame.errors import MoveRefused
+from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.errors import CallRefused
 from cosmic.frame.network.host import Host
@@ -84,6 +85,22 @@ def test_what_a_script_commands_on_its_own_platform_stands_in_the_trail() -> Non
     assert any(verdict == "refused" for _, verdict in moves)
     stops = [(each["what"], each.get("why")) for each in kept if "stop" in each["what"]]
     assert stops == [("stop", "enough")] * 2, "closing stops once more"
+
+
+def test_a_text_that_is_none_ends_no_trail_and_stops_nothing(tmp_path: Path) -> None:
+    policy, stops = FailurePolicy(), list[str]()
+    policy.on_safe_stop(stops.append)
+    trail = AuditTrail(tmp_path / "audit.jsonl", policy)
+    trail.start()
+    try:
+        for why in ("no directory /data/\udce4", "enough"):  # a path that is no UTF-8
+            trail.note(AuditEntry("script", "local", "stop", "done", why))
+    finally:
+        trail.request_end()
+        trail.join()
+    whys = [entry["why"] for entry in read_entries(trail.path)]
+    assert whys == ["no directory /data/\udce4", "enough"]
+    assert not stops
 
 
 def test_closing_is_no_reset_of_a_stop() -> None:

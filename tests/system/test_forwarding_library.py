@@ -36,11 +36,13 @@ assert lib.SA_CTL_Close(handle) == 0
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None or os.name == "nt", reason="needs gcc")
-@pytest.mark.parametrize("make", sorted(CLIENTS))
+@pytest.mark.parametrize(
+    ("make", "folder"), [*((make, "") for make in sorted(CLIENTS)), ("scu3d", "100 %s of %s")]
+)
 def test_a_program_that_knows_the_header_alone_moves_a_simulated_stage(
-    make: str, tmp_path: Path
+    make: str, folder: str, tmp_path: Path
 ) -> None:
-    environment = os.environ | {"PYTHONPATH": str(SRC)}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(SRC), str(tmp_path / folder)])}
     command = [sys.executable, "-m", "cosmic", "simulate", "library", make, "--out", str(tmp_path)]
     built = subprocess.run(
         [*command, "--layout", "LLL,RNN", "--rate", "50"],

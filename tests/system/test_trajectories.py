@@ -4,6 +4,7 @@ import io
 import runpy
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -35,7 +36,7 @@ from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
 from cosmic.mico.core.motion.messages import MovementBegun
 from cosmic.mico.core.trajectory.model import Trajectory, TrajectoryError
 from cosmic.mico.core.trajectory.parser import parse
-from cosmic.mico.core.trajectory_recorder import TrajectoryRecorder
+from cosmic.mico.core.trajectory_recorder import RecordedBegin, TrajectoryRecorder
 from system.simulated_platform import platform, wait_until
 
 HEAD = "cosmic-trajectory 1\nplatform any\n"
@@ -130,6 +131,28 @@ def test_one_recording_at_a_time_and_no_file_is_overwritten_unasked(
     with pytest.raises(RecordingError, match="does not exist"):
         mico.trajectories.record(tmp_path / "none" / "a.trajectory")
     assert mico.trajectories.recording is None
+
+
+@pytest.mark.parametrize("title", ["a\x07b", "x" * 600, "a # b", "\udc80"])
+def test_a_title_that_nobody_could_read_again_is_refused_before_anything_is_recorded(
+    mico: Mico, tmp_path: Path, title: str
+) -> None:
+    with pytest.raises(RecordingError, match="title"):
+        mico.trajectories.record(tmp_path / "a.trajectory", title=title)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_cannot_be_saved_leaves_the_file_that_was_there(mico: Mico, tmp_path: Path) -> None:
+    path = tmp_path / "a.trajectory"
+    mico.trajectories.save(written("left.x to 5 um\n"), path)
+    before = path.read_text(encoding="utf-8")
+    bad = replace(written("left.x to 5 um\n"), title="\udc80")
+    with pytest.raises(RecordingError):
+        mico.trajectories.save(bad, path, overwrite=True)
+    with pytest.raises(RecordingError):
+        mico.trajectories.save(bad, tmp_path / "b.trajectory")
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]
+    assert path.read_text(encoding="utf-8") == before
 
 
 class FullDisk(io.FileIO):
@@ -335,6 +358,52 @@ def test_times_are_kept_and_scale_with_the_speed(mico: Mico) -> None:
     assert took() >= 6.0
     assert took(speed=2.0) < 6.0
     assert took(timed=False) < 5.0
+
+
+def test_neither_a_pause_nor_the_path_to_the_start_takes_time_of_the_trajectory(mico: Mico) -> None:
+    clock = mico.application.manager.clock
+    text = "start left.x 0 um\nt=1 s left.x to 5 um\nt=61 s left.x to 0 um\n"
+    player = mico.trajectories.prepare(written(text))
+    player.resume()
+    wait_until(lambda: player.line == 5)
+    player.pause()
+    assert player.wait_for_pause(1.0)
+    WALL.sleep(2.5)  # 50 s there
+    player.speed = 4.0
+    began_s = clock.now_s()
+    player.resume()
+    player.wait(10.0)
+    assert clock.now_s() - began_s > 8.0
+    axis = mico["left.x"]
+    axis.move_to(2000.0)
+    axis.set_closed_loop_frequency(75)  # so that the way back takes 20 s
+    lines: dict[str, float] = {}
+    player = mico.trajectories.prepare(written(text))
+    player.subscribe(lambda how: lines.setdefault(how.text, clock.now_s()) and None)
+    player.resume("straight")
+    player.wait(10.0)
+    axis.set_closed_loop_frequency(5000)
+    assert clock.now_s() - lines["line 4: t=1 s left.x to 5 um"] > 50.0
+
+
+def test_times_and_speeds_begin_anew_with_each_pass(mico: Mico) -> None:
+    clock = mico.application.manager.clock
+    begun: list[int | None] = []
+    text = "t=0 s left.x to 30 um\nspeed left.x 30 um/s\nt=20 s left.x to 0 um\n"
+    player = mico.trajectories.prepare(written(text), loops=2)
+    end = mico.follow_recorded(
+        lambda it: begun.append(it.frequency_hz) if isinstance(it, RecordedBegin) else None
+    )
+    for _ in range(3):
+        player.step("straight")
+        assert player.wait_for_pause(10.0)
+    assert player.progress.loop == 2
+    began_s = clock.now_s()
+    player.resume()
+    player.wait(10.0)
+    end()
+    assert clock.now_s() - began_s > 15.0
+    assert begun == [None, 20, None, 20], "the first line of each pass at the usual speed"
 
 
 def test_a_stop_ends_it_and_it_goes_on_at_that_line(mico: Mico) -> None:

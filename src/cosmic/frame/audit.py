@@ -105,7 +105,8 @@ class AuditTrail(WorkerThread):
             self._path.parent.mkdir(parents=True, exist_ok=True)
             if self._path.exists() and self._path.stat().st_size > LARGEST_BYTES:
                 self._path.replace(self._path.with_name(self._path.name + ".1"))
-            with self._path.open("a", encoding="utf-8") as file:
+            # What is no text, such as a path of the system's own, is written as its number.
+            with self._path.open("a", encoding="utf-8", errors="backslashreplace") as file:
                 file.writelines(lines)
         except OSError as exc:
             if not self._problem:

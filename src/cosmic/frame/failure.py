@@ -81,15 +81,19 @@ class FailurePolicy:
         if self._entered.stopping:
             return
         self._entered.stopping = True
-        self._safe_stop.emit(reason)
-        self._entered.stopping = False
+        try:
+            self._safe_stop.emit(reason)
+        finally:  # also after Ctrl-C: the next failure must stop as well
+            self._entered.stopping = False
 
     def _publish(self, failure: Failure) -> None:
         if self._entered.publishing:
             return
         self._entered.publishing = True
-        self._failed.emit(failure)
-        self._entered.publishing = False
+        try:
+            self._failed.emit(failure)
+        finally:
+            self._entered.publishing = False
 
     def guarded(self, where: str, function: Callable[P, R], fallback: R) -> Callable[P, R]:
         """Wrap a driver callback, out of which no exception may escape into C code."""

@@ -1,5 +1,6 @@
 """Files that the program keeps for itself, and that a person can read; whole files in general."""
 
+import errno
 import math
 import os
 from collections.abc import Mapping
@@ -26,10 +27,13 @@ def write_whole(path: Path, content: str | bytes) -> None:
     Raises
     ------
     OSError
-        It cannot be written there, or its folder is missing; nothing of it is left.
+        It cannot be written there, its folder is missing, or UTF-8 has no such characters; nothing
+        of it is left.
     """
     part = path.with_name(path.name + PART)
     text = isinstance(content, str)
+    if isinstance(content, str):
+        _check_encodable(content, path)
     try:
         with part.open("w" if text else "wb", encoding="utf-8" if text else None) as file:
             file.write(content)
@@ -40,6 +44,14 @@ def write_whole(path: Path, content: str | bytes) -> None:
         with suppress(OSError):
             part.unlink(missing_ok=True)
         raise
+
+
+def _check_encodable(text: str, path: Path) -> None:
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError as exc:
+        why = f"it would have {text[exc.start]!r}, which UTF-8 cannot say"
+        raise OSError(errno.EILSEQ, why, str(path)) from exc
 
 
 def toml_lines(values: Mapping[str, object]) -> str:

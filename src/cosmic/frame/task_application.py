@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from threading import Lock
 
 from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
@@ -38,6 +39,7 @@ class TaskApplication(CosmicApplicationBase):
         super().__init__(title, policy, gui_factory, parent)
         self._jobs = Jobs(title)
         self._running_task: Task | None = None
+        self._beginning = Lock()
 
     @property
     def running_task(self) -> Task | None:
@@ -52,13 +54,13 @@ class TaskApplication(CosmicApplicationBase):
         NotAvailable
             Another long operation is under way, or the application is closed.
         """
-        running = self._running_task
-        if running is not None and not running.done:
-            raise NotAvailable(f"{running.title} is running; cancel it or wait for its end")
-        if not self.isRunning() or self.end_requested:
-            raise NotAvailable(f"{self.title} is closed")
-        task = Task(title)
-        self._running_task = task
+        with self._beginning:
+            running = self._running_task
+            if running is not None and not running.done:
+                raise NotAvailable(f"{running.title} is running; cancel it or wait for its end")
+            if not self.isRunning() or self.end_requested:
+                raise NotAvailable(f"{self.title} is closed")
+            task = self._running_task = Task(title)
         if not self._jobs.put(lambda: _carry_out(job, task), task):
             raise NotAvailable(f"{self.title} is closed")
         self.task_started.emit(task)

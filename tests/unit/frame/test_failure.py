@@ -166,3 +166,27 @@ def test_a_guarded_callback_that_fails_gives_its_fallback_and_notifies_the_polic
     call = policy.guarded("driver callback", lambda count: 1 // count, -1)
     assert call(0) == -1
     assert witness.events[0].startswith("stop: driver callback: ZeroDivisionError")
+
+
+@pytest.mark.defects
+def test_a_stop_that_was_interrupted_keeps_no_later_failure_from_stopping() -> None:
+    policy, stops, told = FailurePolicy(), list[str](), list[Failure]()
+
+    def stop(reason: str) -> None:
+        stops.append(reason)
+        if len(stops) == 1:
+            raise KeyboardInterrupt
+
+    def tell(failure: Failure) -> None:
+        told.append(failure)
+        if len(told) == 1:
+            raise KeyboardInterrupt
+
+    policy.on_safe_stop(stop)
+    policy.subscribe(tell)
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            policy.report(ZeroDivisionError("first"), "script")
+    policy.report(ZeroDivisionError("then"), "script")
+    assert stops[-1] == "script: ZeroDivisionError: then"
+    assert told[-1].text == "ZeroDivisionError: then"

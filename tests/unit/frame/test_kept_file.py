@@ -53,3 +53,12 @@ def test_the_old_file_stays_whole_where_the_new_one_cannot_be_made(tmp_path: Pat
     with pytest.raises(OSError, match="kept"):
         write_whole(file, "new = 2\n")
     assert file.read_text(encoding="utf-8") == "old = 1\n"
+
+
+def test_a_text_that_no_file_can_have_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    write_whole(path, "old")
+    with pytest.raises(OSError, match="UTF-8"):
+        write_whole(path, "title \udc80")
+    assert [each.name for each in tmp_path.iterdir()] == ["a.toml"]
+    assert path.read_text(encoding="utf-8") == "old"

@@ -148,3 +148,35 @@ def test_an_axis_left_outside_its_limits_jogs_back_to_the_inside_and_no_further_
         assert axis.move_to(-5900.0 * direction) == -5900.0 * direction
         with pytest.raises(cosmic.LimitError):
             axis.move_to(-5901.0 * direction)
+
+
+def test_an_axis_without_sensor_jogs_no_faster_than_it_is_asked_to():
+    with mico() as (rig, controller):
+        began_s = WALL.now_s()
+        with rig["d0.c2"].jog(1, speed=4) as jog:
+            keep_alive(jog, 0.6)
+            asked = 4 * (WALL.now_s() - began_s)
+        jog.movement.exception(2)
+        assert 2 <= sum(call[2] for call in controller.of("step")) <= asked + 1
+
+
+def test_the_steps_of_a_steered_axis_without_sensor_are_counted_as_they_are_made():
+    with mico() as (rig, _):
+        axis = rig["d0.c2"]
+        steering = axis.steer(200.0, dead_man_s=0.5)
+        until_s = WALL.now_s() + 0.5
+        while WALL.now_s() < until_s:
+            steering.renew(-200.0)
+            WALL.sleep(0.01)
+        steering.end()
+        steering.movement.exception(2)
+        assert -250.0 < axis.position_um < -75.0, "100 steps of 1.5 um back"
+
+
+def test_an_axis_without_sensor_that_is_steered_at_no_speed_makes_no_step():
+    with mico() as (rig, controller):
+        steering = rig["d0.c2"].steer(200.0, dead_man_s=0.5)
+        wait_until(lambda: len(controller.of("step")) > 1)
+        steering.renew(0.0)
+        steering.movement.wait(2)
+        assert all(call[2] > 0 for call in controller.of("step"))

@@ -1,8 +1,9 @@
 """Steering by hand: what moves, what stops it, and how soon."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
-from threading import current_thread
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from threading import Barrier, BrokenBarrierError, current_thread
 
 import pytest
 
@@ -122,6 +123,26 @@ def test_nothing_moves_before_the_sticks_were_at_rest():
         assert it.targets == []
         hand.axes["x"] = 0.0
         wait_until(lambda: it.phase is Phase.ARMED)
+
+
+def test_of_two_devices_started_at_the_same_moment_one_steers_and_none_is_left_behind():
+    with rig() as it:
+        both = Barrier(2)
+        stop = it.teleoperation.stop
+
+        def stop_together():
+            stop()
+            with suppress(BrokenBarrierError):
+                both.wait(0.5)
+
+        it.teleoperation.stop = stop_together  # both get as far as they can together
+        hands = [HandInput(), HandInput()]
+        with ThreadPoolExecutor() as pool:
+            for each in [pool.submit(it.teleoperation.start, hand, "two") for hand in hands]:
+                each.result(10.0)
+        it.teleoperation.stop = stop
+        it.teleoperation.stop()
+        wait_until(lambda: [hand.closed for hand in hands] == [1, 1], 5.0)
 
 
 def unplug(it: Rig) -> None:

@@ -174,6 +174,24 @@ def test_an_axis_that_was_moved_otherwise_counts_from_where_it_stands():
     assert sent["b"].target == pytest.approx(510.0)
 
 
+def test_a_rotary_axis_that_was_halted_goes_on_from_where_it_stands():
+    with mico(("RRN",)) as (rig, controller):
+        first, second = rig["d0.c0"], rig["d0.c1"]
+        rig.link(first.key, second.key)
+        controller.instant = False
+        movement = first.move_to(1.0, wait=False)
+        wait_until(lambda: len(controller.of("move_to")) == 2)
+        for axis in (first, second):
+            controller.position[axis.details.address] = 0.4
+        first.halt()
+        with pytest.raises(cosmic.MoveCancelled):
+            movement.wait(5)
+        wait_until(lambda: not (first.details.in_motion or second.details.in_motion))
+        controller.instant = True
+        first.move_by(0.1)
+        assert (first.angle_deg, second.angle_deg) == pytest.approx((0.5, 0.5))
+
+
 # Arriving together
 
 

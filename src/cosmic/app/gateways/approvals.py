@@ -166,6 +166,9 @@ class Approvals(Declared):
     @staticmethod
     def _carry_out(found: _Waiting) -> None:
         operation = found.operation
+        if operation.cancel_requested:  # while it waited for others that were approved
+            operation.fail(OperationCancelled("taken back before it was begun"))
+            return
         try:
             result = found.carry_out()
         except CosmicError as exc:

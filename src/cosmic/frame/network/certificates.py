@@ -16,6 +16,8 @@ from cosmic.frame.network.line_settings import Certificates
 from cosmic.frame.network.station import checked_name
 
 VALID_DAYS: Final = 3650
+LONGEST_NAME: Final = 64
+"""A certificate bears no longer one."""
 _LOCAL: Final = ("localhost", "127.0.0.1", "::1")
 
 Key = ec.EllipticCurvePrivateKey
@@ -42,11 +44,14 @@ def make_certificates(
     Raises
     ------
     ConfigError
-        A name is none, a station has certificates there already, or the authority is broken.
+        A name or a host is none, a station has certificates there already, or the authority is
+        broken or lacks its key.
     """
     known = addresses or {}
     for name in (*stations, *known):
         _check(folder, name, known=name in stations)
+        for host in known.get(name, ()):
+            _general(host)
     key, authority = _authority(folder / "authority", valid_days)
     made = {}
     for name in stations:
@@ -62,6 +67,8 @@ def _check(folder: Path, name: str, *, known: bool) -> None:
         raise ConfigError(str(exc)) from exc
     if not known or name == "authority":
         raise ConfigError(f"{name!r} is not among the stations")
+    if len(name) > LONGEST_NAME:
+        raise ConfigError(f"{name[:20]}...: a name has at most {LONGEST_NAME} letters")
     if (folder / name).exists():
         raise ConfigError(f"{folder / name} is there already; remove it to make new ones")
 
@@ -70,6 +77,12 @@ def _authority(folder: Path, valid_days: int) -> tuple[Key, x509.Certificate]:
     certificate_file, key_file = folder / "certificate.pem", folder / "key.pem"
     if certificate_file.exists() and key_file.exists():
         return _read_authority(certificate_file, key_file)
+    if folder.exists():
+        missing = key_file if certificate_file.exists() else certificate_file
+        raise ConfigError(
+            f"{missing}: the authority lacks this file; bring it back to sign further stations, or "
+            "begin in another folder"
+        )
     key = ec.generate_private_key(ec.SECP256R1())
     name = _name("CoSMic stations")
     usage = x509.KeyUsage(
@@ -173,7 +186,14 @@ def _general(host: str) -> x509.GeneralName:
     try:
         return x509.IPAddress(ipaddress.ip_address(host))
     except ValueError:
+        pass
+    try:
         return x509.DNSName(host)
+    except ValueError as exc:
+        raise ConfigError(
+            f"{host!r} is no name of a computer: letters, digits, dots and hyphens, others as "
+            "xn--..."
+        ) from exc
 
 
 def _builder(

@@ -17,7 +17,7 @@ from cosmic.frame.network.transport import Transport
 from cosmic.frame.operation import Operation, Progress, Task
 from cosmic.frame.threads import may_wait_here
 from cosmic.mico.api.application_base import MicoApplicationBase
-from cosmic.mico.api.initialisation import POLL_S, Confirm
+from cosmic.mico.api.initialisation import POLL_S, Confirm, confirmed
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
@@ -224,7 +224,7 @@ class MicoClient(MicoApplicationBase):
         while confirm is not None and not over.wait(POLL_S):
             question = self.api.initialisation.question
             if question and question != answered:
-                self.api.answer(confirm(question))
+                self.api.answer(confirmed(confirm, question))
             answered = question
 
 

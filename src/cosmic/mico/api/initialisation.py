@@ -151,11 +151,7 @@ class InitialisationRun:
         if self._confirm is None:
             raise MoveCancelled(f"nobody is there to confirm {text!r}; pass confirm")
         self._publish(replace(self._report, question=text))
-        try:
-            agreed = self._confirm(text)
-        except Exception:  # a script's own mistake must not end this thread
-            logger.exception("what should confirm %r failed", text)
-            agreed = False
+        agreed = confirmed(self._confirm, text)
         self._publish(replace(self._report, question=""))
         if not agreed:
             raise MoveCancelled(f"{text!r} was answered with no")
@@ -178,6 +174,15 @@ class InitialisationRun:
         self._report = report
         if self._on_report is not None:
             self._on_report(report)
+
+
+def confirmed(confirm: Confirm, text: str) -> bool:
+    """Return what somebody answers; no where the script that should answer has a mistake."""
+    try:
+        return confirm(text)
+    except Exception:  # it must not end the thread that asks
+        logger.exception("what should confirm %r failed", text)
+        return False
 
 
 class Asker:

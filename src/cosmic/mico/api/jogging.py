@@ -48,7 +48,8 @@ class Jogging:
         Parameters
         ----------
         velocity : float
-            Signed speed from now on, of what `Axis.steer` began; None: as it is.
+            Signed speed from now on, of what `Axis.steer` began; None: as it is. At 0 an axis
+            stands still, and of one without sensor the movement ends.
         """
         self._renew(velocity)
 

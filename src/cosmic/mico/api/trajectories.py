@@ -14,6 +14,7 @@ from cosmic.frame.arguments import checked_class
 from cosmic.frame.declaration import Declared, command, part
 from cosmic.frame.errors import DeviceTimeout, NotAvailable, RecordingError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.kept_file import write_whole
 from cosmic.frame.network.transfer import transferable
 from cosmic.frame.operation import Operation, Progress
 from cosmic.frame.weakly import weakly
@@ -201,10 +202,17 @@ class Trajectories(Declared):
         bind(trajectory, self._platform.facts())
 
     def save(self, trajectory: Trajectory, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write a trajectory to a file; raises `RecordingError`."""
+        """Write a trajectory to a file; raises `RecordingError`, and leaves then what was there."""
+        file = Path(path)
         try:
-            with Path(path).open("w" if overwrite else "x", encoding="utf-8") as file:
-                file.write(to_text(trajectory))
+            if not overwrite:
+                file.open("xb").close()  # so that no other program's is overwritten either
+            try:
+                write_whole(file, to_text(trajectory))
+            except OSError:
+                if not overwrite:
+                    file.unlink(missing_ok=True)
+                raise
         except (OSError, ValueError) as exc:  # a name with a zero in it is no OSError
             raise RecordingError(f"{path} cannot be written: {exc}") from exc
 

@@ -39,6 +39,10 @@ class LegMover:
         """Have an axis go so fast from here on."""
         self._wanted[step.axis] = step.frequency_hz
 
+    def begin_again(self) -> None:
+        """Have the speeds that lines have set hold for the next pass no longer."""
+        self._wanted.clear()
+
     def move(self, leg: BoundLeg, speed: float, task: Task) -> None:
         """Make the movements of a line, or what is left of them after a failure."""
         motions: dict[str, Motion] = {}

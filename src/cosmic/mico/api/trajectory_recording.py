@@ -14,6 +14,7 @@ from cosmic.frame.events import notify
 from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.core.poses import Pose
 from cosmic.mico.core.trajectory.model import Trajectory
+from cosmic.mico.core.trajectory.reader import head_problem
 from cosmic.mico.core.trajectory_recorder import Recordable, TrajectoryRecorder
 
 
@@ -122,8 +123,10 @@ class Recordings:
         running = self.current
         if running is not None:
             raise NotAvailable(f"{running.path} is being recorded; stop that first")
-        if "\n" in title or "#" in title:
-            raise RecordingError("a title is one line without #")
+        said = (("title", title, "a title"), ("platform", platform, "the name of a platform"))
+        for word, text, what in said:
+            if problem := head_problem(word, text):  # or nobody could read the file
+                raise RecordingError(f"{what} {problem}: {text[:60]!r}")
         head = Trajectory(
             platform=platform or "any",
             statements=(),

@@ -36,7 +36,8 @@ class TrajectoryRun:
         self.loop = 1
         self.at_line = False
         self._remaining: dict[int, float] = {}
-        self._mark = (0.0, 0.0)
+        # When the time of the trajectory was looked at, None while it stands, and what it was.
+        self._mark: tuple[float | None, float] = (None, 0.0)
         self._waited_s = 0.0
         self._epoch = 0
 
@@ -80,7 +81,8 @@ class TrajectoryRun:
 
     def change_speed(self, factor: float) -> None:
         """Go on at another speed; any thread, under the control's lock."""
-        self._mark = (self._clock.now_s(), self._time_s())
+        if self._mark[0] is not None:
+            self._run_from(self._time_s())
         self._control.speed = factor
 
     # Carrying out
@@ -94,16 +96,16 @@ class TrajectoryRun:
             What ended it.
         """
         self.at_line = False
-        self._mark = (self._clock.now_s(), self._mark[1] if self.begun else 0.0)
         try:
             self._prepare(task, say)
+            self._run_from(self._mark[1])
             while not self._pass(task, say):
                 if self._control.pausing:
                     return False
                 self._begin_again(task, say)
             return True
         finally:
-            self._mark = (self._clock.now_s(), self._time_s())
+            self._halt_at(self._time_s())
             self.mover.restore_speeds()
 
     def _prepare(self, task: Task, say: Callable[[str], None]) -> None:
@@ -139,8 +141,8 @@ class TrajectoryRun:
             self.mover.go_to(waypoint, task)
 
     def _begin_again(self, task: Task, say: Callable[[str], None]) -> None:
-        self._mark = (self._clock.now_s(), 0.0)
         self._go_to_place(task, say)
+        self._run_from(self._mark[1])
 
     def _pass(self, task: Task, say: Callable[[str], None]) -> bool:
         """Go on to the last line; returns True when that was the last pass."""
@@ -160,7 +162,9 @@ class TrajectoryRun:
             return True
         self.loop += 1
         self.next = 0
+        self._halt_at(0.0)
         self.start_positions.begin_again()
+        self.mover.begin_again()
         return False
 
     def _line_text(self, line: int) -> str:
@@ -188,7 +192,19 @@ class TrajectoryRun:
     def _time_s(self) -> float:
         """Return the time of the trajectory."""
         since_s, at_s = self._mark
+        if since_s is None:
+            return at_s
         return at_s + (self._clock.now_s() - since_s) * self._control.speed
+
+    def _run_from(self, at_s: float) -> None:
+        """Have the time of the trajectory go on from `at_s`."""
+        with self._control.changed:
+            self._mark = (self._clock.now_s(), at_s)
+
+    def _halt_at(self, at_s: float) -> None:
+        """Have it stand at `at_s`: a pause, a rehearsal and the path to its start take none."""
+        with self._control.changed:
+            self._mark = (None, at_s)
 
     def _wait_at(self, at_s: float | None, task: Task) -> bool:
         """Wait until the time of the trajectory is `at_s`."""

@@ -4,13 +4,14 @@ import logging
 import math
 import re
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Mapping, MutableMapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import RLock
 from typing import Final
 
 import tomlkit
+from tomlkit.exceptions import TOMLKitError
 
 from cosmic.frame.config import not_there, read_toml
 from cosmic.frame.errors import ConfigError, NotAvailable
@@ -83,7 +84,8 @@ class PoseBook:
     def put(self, pose: Pose) -> None:
         """Keep a pose, in the place of one of the same name.
 
-        Where the file cannot be written all poses stay in memory, and `path` is None from then on.
+        Where the file cannot be written, or is no TOML any more, it stays as it is, all poses stay
+        in memory, and `path` is None from then on.
 
         Raises
         ------
@@ -112,7 +114,7 @@ class PoseBook:
         try:
             text = path.read_text(encoding="utf-8") if path.exists() else HEAD
             write_whole(path, _replaced(text, name, self._poses.get(name)))
-        except (OSError, UnicodeDecodeError) as exc:
+        except (OSError, UnicodeDecodeError, TOMLKitError) as exc:
             self._path = None
             logger.warning("%s cannot be written (%s): poses are kept in memory only", path, exc)
 
@@ -161,10 +163,12 @@ def _misfit(axis: str, kinds: Mapping[str, str]) -> str:
 def _replaced(text: str, name: str, pose: Pose | None) -> str:
     """Return `text` with the section of one pose replaced, added, or taken out."""
     document = tomlkit.parse(text)
-    if pose is None:
-        document.remove(name)
-        return tomlkit.dumps(document)
     section = document.get(name)
+    if section is not None and (pose is None or not isinstance(section, MutableMapping)):
+        document.remove(name)
+        section = None
+    if pose is None:
+        return tomlkit.dumps(document)
     if section is None:
         section = tomlkit.table()
         document.append(name, section)

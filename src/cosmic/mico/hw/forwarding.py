@@ -95,10 +95,11 @@ def fill(make: Make, address: int, layout: str, rate: float, seed: int) -> None:
 def source(make: Make, *, layout: str, rate: float, seed: int) -> str:
     """Return the C source of the library for `make`."""
     paths = [path for path in sys.path if path]
-    python = (
-        f"import sys; sys.path += [p for p in {paths!r} if p not in sys.path]; "
-        f"from cosmic.mico.hw.forwarding import fill; fill({make!r}, %zu, {layout!r}, {rate!r}, "
-        f"{seed!r})"
+    begin = f"import sys; sys.path += [p for p in {paths!r} if p not in sys.path]; "
+    given = f"{layout!r}, {rate!r}, {seed!r}"
+    python = (  # a format of C: a folder may have a percent sign in its name
+        begin.replace("%", "%%")
+        + f"from cosmic.mico.hw.forwarding import fill; fill({make!r}, %zu, {given})"
     )
     code = python.replace("\\", "\\\\").replace('"', '\\"')
     folder, name = (sysconfig.get_config_var(key) for key in ("LIBDIR", "INSTSONAME"))

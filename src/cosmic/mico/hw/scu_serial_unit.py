@@ -111,6 +111,7 @@ class Unit:
     _events: deque[Event] = field(default_factory=deque)
     _free: Lock = field(default_factory=Lock)
     _sent: int = 0
+    _stopped: dict[int, int] = field(default_factory=dict)
     _known: dict[tuple[int, str], tuple[int, str]] = field(default_factory=dict)
     _echo: deque[str] = field(default_factory=deque)
     _rest: bytes = b""
@@ -162,8 +163,14 @@ class Unit:
                 logger.info("%s: %s was not sent: a stop came first", self.name, each.said)
                 self._commands.remove(each)
             yield stop
-        if not self._unanswered and self._commands:
-            yield self._commands.popleft()
+        while not self._unanswered and self._commands:
+            line = self._commands.popleft()
+            again = line.moves and line.tries > 0
+            if again and self._stopped.get(line.at.channel, 0) > line.number:
+                logger.info("%s: %s was not sent again: a stop came", self.name, line.said)
+                continue
+            yield line
+            break
         while not self._unanswered and self._questions:
             line = self._questions.popleft()
             known = self._known.get((line.at.channel, line.said))
@@ -179,6 +186,8 @@ class Unit:
             self._forget(line.at)
         self._sent += 1
         line.number = self._sent
+        if line.stops:
+            self._stopped[line.at.channel] = line.number
         self._unanswered.append(line)
         if self.echoes:
             self._echo.append(line.said)

@@ -96,3 +96,21 @@ def test_the_engine_accepts_every_setting_and_finds_nobody_by_itself(tmp_path: P
     assert '"default_permission":"deny"' in made.get_json("access_control")
     client = config(Line("tcp/127.0.0.1:7450", listens=False, station="fibres"))
     assert client.get_json("listen/endpoints") == "[]"
+
+
+def test_what_no_certificate_can_bear_is_refused_before_anything_is_made(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="name of a computer"):
+        make_certificates(tmp_path / "a", "fibre", addresses={"fibre": ["müller.local"]})
+    with pytest.raises(ConfigError, match="at most 64"):
+        make_certificates(tmp_path / "a", "x" * 65)
+    assert not (tmp_path / "a").exists()
+
+
+def test_an_authority_whose_key_was_taken_away_asks_for_it(tmp_path: Path) -> None:
+    make_certificates(tmp_path, "fibre")
+    key = tmp_path / "authority" / "key.pem"
+    kept = key.rename(tmp_path / "kept.pem")
+    with pytest.raises(ConfigError, match=r"key\.pem: the authority lacks this file"):
+        make_certificates(tmp_path, "vision")
+    kept.rename(key)
+    assert make_certificates(tmp_path, "vision")

@@ -76,3 +76,26 @@ def test_where_the_file_cannot_be_written_poses_stay_in_memory(tmp_path: Path) -
     book.put(Pose("a", {"x": 1.0}))
     assert book.path is None
     assert book["a"].positions == {"x": 1.0}
+
+
+def test_a_file_that_became_wrong_meanwhile_stays_and_poses_are_kept_in_memory(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "poses.toml"
+    book = PoseBook(path)
+    book.put(Pose("a", {"left.x": 1.0}))
+    path.write_text("[a]\n'left.x' = = 1\n", encoding="utf-8")
+    book.put(Pose("b", {"left.x": 2.0}))
+    assert list(book.poses) == ["a", "b"] and book.path is None
+    assert path.read_text(encoding="utf-8") == "[a]\n'left.x' = = 1\n"
+
+
+def test_what_the_user_took_out_of_the_file_can_be_removed_and_taught_again(tmp_path: Path) -> None:
+    path = tmp_path / "poses.toml"
+    book = PoseBook(path)
+    for name in "ab":
+        book.put(Pose(name, {"left.x": 1.0}))
+    path.write_text("b = 3\n", encoding="utf-8")
+    book.remove("a")
+    book.put(Pose("b", {"left.x": 2.0}))
+    assert PoseBook(path).poses == book.poses == {"b": Pose("b", {"left.x": 2.0})}

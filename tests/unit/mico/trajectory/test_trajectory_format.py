@@ -223,3 +223,10 @@ def test_no_bytes_do_anything_but_be_read_or_refused(data: bytes) -> None:
             parse(text)
         except TrajectoryError as exc:
             assert exc.problems
+
+
+def test_a_platform_may_have_any_name_that_its_file_may_give_it() -> None:
+    name = "Lab 3, east: fibres"
+    found = parse(f"cosmic-trajectory 1\nplatform {name}\nleft.x to 5 um\n")
+    assert found.platform == name
+    assert parse(to_text(found)).platform == name

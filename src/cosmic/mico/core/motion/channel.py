@@ -346,6 +346,9 @@ class ChannelController:
             motion = MoveTo(
                 math.nan if reservation.target is None else reservation.target, motion.unit
             )
+        active = self.monitor.active
+        if active is not None and active.jog is not None:
+            active.begin_burst(motion, self._context.clock.now_s())
         try:
             self._positioner.send(self._context.controller, motion)
         except DeviceError as exc:

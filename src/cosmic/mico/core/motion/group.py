@@ -326,7 +326,8 @@ class GroupOrders:
             if state.position is not None
         }
         known = {name: where for name, where in stand.items() if where is not None}
-        return self._links.expanded(motions, known, self._axes.settings.watch.tolerance_um)
+        watch = self._axes.settings.watch
+        return self._links.expanded(motions, known, watch.tolerance_um, watch.tolerance_deg)
 
     def _requests(
         self, motions: Mapping[str, Motion], *, consent: bool, alone: bool = False

@@ -97,15 +97,23 @@ class JogRun:
         return WALL.now_s() - self._renewed_wall_s > self._settings.jog.dead_man_s
 
     def packet(self, state: PositionerState, now_s: float) -> Motion | None:
-        """Return the next packet, or None when the jog is over: let go, or at the limit."""
+        """Return the next packet, or None when the jog is over: let go, or at the limit.
+
+        Without a sensor it is over at speed 0 as well: no packet has fewer steps than one.
+        """
         if self.let_go():
             return None
         packet_s = self._settings.jog.packet_s
         self._next_s = now_s + 0.4 * packet_s
-        if state.kind is PositionerKind.OPEN_LOOP:
-            frequency_hz = max(1, round(self.speed))
-            return self._step(max(1, math.floor(frequency_hz * packet_s)), frequency_hz)
-        return self._towards_limit(state, now_s, packet_s)
+        if state.kind is not PositionerKind.OPEN_LOOP:
+            return self._towards_limit(state, now_s, packet_s)
+        if self.speed == 0.0:
+            return None
+        frequency_hz = max(1, round(self.speed))
+        # After a whole number of steps, for each packet makes its first one at once.
+        whole = math.ceil(0.4 * packet_s * frequency_hz - 1e-9)
+        self._next_s = now_s + whole / frequency_hz
+        return self._step(max(1, math.floor(frequency_hz * packet_s)), frequency_hz)
 
     def _towards_limit(
         self, state: PositionerState, now_s: float, packet_s: float

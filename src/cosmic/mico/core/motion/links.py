@@ -109,7 +109,11 @@ class LinkTable:
     # Moving
 
     def expanded(
-        self, motions: Mapping[str, Motion], stand: Mapping[str, float], tolerance: float
+        self,
+        motions: Mapping[str, Motion],
+        stand: Mapping[str, float],
+        tolerance: float,
+        tolerance_deg: float | None = None,
     ) -> dict[str, Motion]:
         """Return `motions` with what the axes linked to them do, as positions to go to.
 
@@ -120,8 +124,9 @@ class LinkTable:
         ----------
         stand : mapping of float
             Where each axis stands, or is going, in gate coordinates.
-        tolerance : float
-            How far from where it was sent an axis may stand and still be taken to be there.
+        tolerance, tolerance_deg : float
+            How far from where it was sent an axis may stand and still be taken to be there; of
+            rotary axes `tolerance_deg`, where that is given.
         """
         found = dict(motions)
         for name, motion in motions.items():
@@ -134,11 +139,14 @@ class LinkTable:
             }
             if not companions or name not in stand:
                 continue
-            here = self._nominal(name, stand[name], tolerance)
+            near = tolerance
+            if motion.unit == "deg" and tolerance_deg is not None:
+                near = tolerance_deg
+            here = self._nominal(name, stand[name], near)
             target = here + motion.distance if isinstance(motion, MoveBy) else motion.target
             found[name] = MoveTo(target, motion.unit)
             for other, ratio in companions.items():
-                there = self._nominal(other, stand[other], tolerance)
+                there = self._nominal(other, stand[other], near)
                 found[other] = MoveTo(there + ratio * (target - here), motion.unit)
         return found
 

@@ -21,7 +21,14 @@ from cosmic.mico.core.motion.channel_speed import ChannelSpeed, quietly
 from cosmic.mico.core.motion.jog import JogRun
 from cosmic.mico.core.motion.messages import MovementBegun, Order
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import Jog, Reference, Reservation, Step, motion_text
+from cosmic.mico.core.motion.orders import (
+    Jog,
+    Motion,
+    Reference,
+    Reservation,
+    Step,
+    motion_text,
+)
 from cosmic.mico.core.motion.positioner import (
     Confidence,
     CountedTravel,
@@ -68,6 +75,12 @@ class ActiveMove:
         Platform time of the last heartbeat.
     progress_position : float or None
         Where it was then.
+    burst : Step or None
+        Of a jog without sensor, the packet that was sent last, while it may be carried out.
+    burst_s : float
+        Platform time at which it was sent.
+    counted : float
+        Steps, as if at 100 V, of the packets before it.
     """
 
     order: Order
@@ -83,6 +96,25 @@ class ActiveMove:
     reported: bool = False
     awaiting: bool = False
     replaced: bool = False
+    burst: Step | None = None
+    burst_s: float = 0.0
+    counted: float = 0.0
+
+    def begin_burst(self, motion: Motion, now_s: float) -> None:
+        """Count the steps of a packet that was sent."""
+        self.end_burst(now_s)
+        if isinstance(motion, Step):
+            self.burst, self.burst_s = motion, now_s
+
+    def end_burst(self, now_s: float) -> None:
+        """Count no further steps: they were stopped, or others follow."""
+        self.counted, self.burst = self.steps_made(now_s), None
+
+    def steps_made(self, now_s: float) -> float:
+        """Return how many steps of a jog were made, as if at 100 V, with their sign."""
+        if self.burst is None:
+            return self.counted
+        return self.counted + _steps_in(self.burst, now_s - self.burst_s)
 
     @property
     def has_own_speed(self) -> bool:
@@ -150,13 +182,17 @@ def missed_target(
 def counted_distance(active: ActiveMove, step_um: float, now_s: float) -> float:
     """Estimate how far an axis without sensor went during `active`, in um."""
     motion, made = active.order.motion, 0.0
-    elapsed_s = now_s - active.started_s
     if isinstance(motion, Step):
-        ran = min(float(abs(motion.steps)), elapsed_s * motion.frequency_hz)
-        made = math.copysign(ran, motion.steps) * motion.amplitude_v / 100.0
+        made = _steps_in(motion, now_s - active.started_s)
     elif isinstance(motion, Jog):
-        made = motion.direction * motion.speed * elapsed_s
+        made = active.steps_made(now_s)
     return made * step_um
+
+
+def _steps_in(motion: Step, elapsed_s: float) -> float:
+    """Return how many steps were made by then, as if at 100 V, with their sign."""
+    ran = min(float(abs(motion.steps)), elapsed_s * motion.frequency_hz)
+    return math.copysign(ran, motion.steps) * motion.amplitude_v / 100.0
 
 
 MOST_OPEN: Final = 8
@@ -366,6 +402,7 @@ class MotionMonitor:
         if self.active is not None:
             self.active.leave_line(self._name)
             self.active.progress_s = self._context.clock.now_s()
+            self.active.end_burst(self.active.progress_s)
             self.ask_activity()
 
     def lose(self, error: CosmicError) -> None:
@@ -400,6 +437,7 @@ class MotionMonitor:
         if error is not None:
             logger.warning("%s: jogging ended: %s", self._name, error)
         self._stop()
+        active.end_burst(self._context.clock.now_s())
         self.ask_activity()
 
     def fail(self, error: DeviceError) -> None:

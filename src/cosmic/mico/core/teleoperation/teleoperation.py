@@ -206,8 +206,8 @@ class Teleoperation:
             The device is not there.
         """
         chosen = self.profile(profile)
-        self.stop()
-        with self._lock:
+        with self._lock:  # of two that start at once, the second ends what the first began
+            self.stop()
             self._refuse_if_not_ready()
             opened = self.sources.open(device) if isinstance(device, str) else device
             try:

@@ -1,6 +1,7 @@
 """`TrajectoryReader`: takes a trajectory line by line, and everything wrong with its line."""
 
 import re
+import unicodedata
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
@@ -31,6 +32,16 @@ _STEPS: Final = re.compile(r"([+-]?\S+?)(?:\s+(\S+?\s*m?V))?(?:\s+(\S+?\s*k?Hz))
 OnProgress = Callable[[float], object]
 
 
+def head_problem(word: str, text: str) -> str:
+    """Return why the line of that word, such as "title", cannot say `text`; empty where it can."""
+    if "\n" in text or "#" in text:
+        return "is one line without #"
+    if _CONTROL.search(text) or any(unicodedata.category(each) == "Cs" for each in text):
+        return "has only characters that can be printed"
+    longest = LONGEST_LINE - len(word) - 1
+    return f"has at most {longest} characters" if len(text) > longest else ""
+
+
 class TrajectoryReader:
     """Takes one line after the other and keeps what it says."""
 
@@ -50,7 +61,7 @@ class TrajectoryReader:
         self._ended = 0
         self._line = 0
         self._words: dict[str, Callable[[str], None]] = {
-            "platform": lambda rest: self._note("platform", words.free_name(rest, "platform")),
+            "platform": lambda rest: self._note("platform", rest),
             "title": lambda rest: self._note("title", rest),
             "recorded": lambda rest: self._note("recorded", rest),
             "relative": self._relative,
