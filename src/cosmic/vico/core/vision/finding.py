@@ -11,7 +11,7 @@ from cosmic.vico.core.vision import axial, certainty, checks, picture_edge
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
-from cosmic.vico.core.vision.grey import Floats, Mask, grey_image
+from cosmic.vico.core.vision.grey import Floats, Mask, grey_image, middle
 from cosmic.vico.core.vision.joining import Strand, strands
 from cosmic.vico.core.vision.measures import (
     grasp_points,
@@ -122,7 +122,7 @@ def long_enough(strand: Strand, factor: int, least: float) -> bool:
 def slender(course: Course, least: float) -> bool:
     """Return whether what was measured is long and narrow."""
     length = float(arc_lengths(course.line)[-1])
-    typical = float(np.median(course.contrast[course.good])) if course.good.any() else 0.0
+    typical = middle(course.contrast[course.good]) if course.good.any() else 0.0
     long = length >= max(least, SLENDER * course.width)
     return long and typical > 0 and checks.edging(course, typical) < 0.5
 
@@ -160,7 +160,7 @@ def fibre(
         doubts.append(certainty.IMPROBABLE)
     width_std = width_deviation(course, section)
     free = clear_around(scene, line, width)
-    contrast = float(np.median(course.contrast[course.good]))
+    contrast = middle(course.contrast[course.good])
     return Fibre(
         centre_line_px=frozen(line),
         widths_px=frozen(widths),

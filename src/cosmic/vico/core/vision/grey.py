@@ -1,6 +1,6 @@
 """Images as machine vision takes them: one layer, 8 or 16 bit."""
 
-from typing import cast
+from typing import TypeVar, cast
 
 import cv2
 import numpy as np
@@ -11,6 +11,7 @@ from cosmic.vico.hw.interface import Pixels
 
 Floats = npt.NDArray[np.float64]
 Floats32 = npt.NDArray[np.float32]
+FloatsOrFloats32 = TypeVar("FloatsOrFloats32", Floats, Floats32)
 Mask = npt.NDArray[np.uint8]
 
 LEAST_SIDE_PX = 16
@@ -107,6 +108,15 @@ def middle(values: npt.NDArray[np.floating]) -> float:
     if flat.size % 2:
         return high
     return 0.5 * (float(flat[half - 1] if flat.size < FEW else flat[:half].max()) + high)
+
+
+def middles(values: FloatsOrFloats32) -> FloatsOrFloats32:
+    """Return the median of each row of some numbers, in their own type."""
+    ordered = np.sort(values, axis=1)
+    half = values.shape[1] // 2
+    if values.shape[1] % 2:
+        return ordered[:, half]
+    return 0.5 * (ordered[:, half - 1] + ordered[:, half])
 
 
 def quantile(values: npt.NDArray[np.floating], share: float) -> float:

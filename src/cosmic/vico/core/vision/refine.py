@@ -182,8 +182,9 @@ def move(
     used = weights > 0
     if used.sum() > 8:
         typical = middle(rest[used])
-        limit = 4.0 * 1.4826 * typical + 0.1
-        line = smooth(target, np.where(rest > limit, 0.0, weights), wave)
+        off = rest > 4.0 * 1.4826 * typical + 0.1
+        if (off & used).any():
+            line = smooth(target, np.where(off, 0.0, weights), wave)
         course.scatter_px = 1.2 * typical
     course.line = line
 

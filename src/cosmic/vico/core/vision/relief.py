@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.vico.core.vision.grey import Floats32, Mask, middle, quantile
+from cosmic.vico.core.vision.grey import Floats32, Mask, middle, middles, quantile
 from cosmic.vico.hw.interface import Pixels
 
 # Wider bodies are tools, not fibres: the ground is what remains of them. Full-size pixels.
@@ -174,7 +174,7 @@ def find_relief(image: Pixels) -> Relief:
         walls = thresholded(found[1][2])
         if lined(mask, walls):
             chosen, mask = found[1][2], walls
-    crowded = float(mask.mean()) > CROWDED
+    crowded = cv2.countNonZero(mask) > CROWDED * mask.size
     hollow = np.zeros_like(mask) if crowded else insides(mask, HOLLOW_PX / factor)
     if hollow.any():
         away = from_ground(small, ground, chosen)
@@ -204,18 +204,16 @@ def blockiness(image: Pixels) -> float:
     quality 75 and 3 at 40. Wherever the first border lies is found.
     """
     found = 0.0
-    for axis in (1, 0):
-        lines = image.shape[1 - axis]
-        step = 1 + lines // MOST_LINES
-        thin = np.ascontiguousarray(image[::step] if axis else image[:, ::step])
-        pairs = (thin[:, 1:], thin[:, :-1]) if axis else (thin[1:], thin[:-1])
-        total = cv2.reduce(cv2.absdiff(*pairs), 1 - axis, cv2.REDUCE_SUM, dtype=cv2.CV_32F)
-        across = (total.ravel() / np.float64(thin.shape[1 - axis])).astype(np.float32)
+    for turned in (image, image.T):
+        thin: Pixels = np.ascontiguousarray(turned[:: 1 + len(turned) // MOST_LINES])
+        steps = cv2.absdiff(thin[:, 1:], thin[:, :-1])
+        total = cv2.reduce(steps, 0, cv2.REDUCE_SUM, dtype=cv2.CV_32F).ravel()
+        across = (total / np.float64(len(thin))).astype(np.float32)
         count = len(across) // BLOCK_PX
         if count < FEWEST_BLOCKS:
             continue
-        by_phase = np.median(across[: count * BLOCK_PX].reshape(count, BLOCK_PX), axis=0)
-        usual = max(float(np.median(by_phase)), LEAST_DIFFERENCE)
+        by_phase = middles(across[: count * BLOCK_PX].reshape(count, BLOCK_PX).T)
+        usual = max(float(middles(by_phase[None])[0]), LEAST_DIFFERENCE)
         found += 0.5 * max(0.0, float(by_phase.max()) / usual - 1.0)
     return found
 
