@@ -79,7 +79,7 @@ def plateau(mean: Floats) -> float:
 
 def leaving(line: Floats, width: float) -> Floats:
     """Return the direction in which a line leaves its end."""
-    count = int(np.clip(round(0.6 * width), 3, max(3, len(line) // 3)))
+    count = min(max(round(0.6 * width), 3), max(3, len(line) // 3))
     return np.asarray(
         directions(line[-count - 1 :]).mean(axis=0) if len(line) > 3 else directions(line)[-1]
     )

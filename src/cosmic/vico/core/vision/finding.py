@@ -318,17 +318,16 @@ def explained_by(scene: Scene, lines: list[Floats], widths: list[float]) -> Mask
 
 def left_over(scene: Scene, lines: list[Floats], widths: list[float], explained: Mask) -> set[int]:
     """Return the fibres to which something large clings that no fibre explains."""
-    rest = ((scene.taken > 0) & (explained == 0)).astype(np.uint8)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
-    areas = stats[:, cv2.CC_STAT_AREA].copy()
-    areas[0] = 0
+    rest = (scene.taken > 0) & (explained == 0)
+    _, labels = cv2.connectedComponents(rest.view(np.uint8), connectivity=8)
+    areas = np.bincount(labels[rest])
     found: set[int] = set()
     if not (areas >= 12).any():
         return found
     for index, (line, width) in enumerate(zip(lines, widths, strict=True)):
         around = np.zeros(rest.shape, np.uint8)
         strip(around, scene.reduced(line), width / scene.factor + 8.0)
-        beside = np.unique(labels[(around > 0) & (rest > 0)])
+        beside = np.unique(labels[(around > 0) & rest])
         if len(beside) and int(areas[beside].max()) > max(11.0, 3.0 * (width / scene.factor) ** 2):
             found.add(index)
     return found

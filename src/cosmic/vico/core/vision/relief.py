@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import cv2
 import numpy as np
@@ -205,7 +206,7 @@ def blockiness(image: Pixels) -> float:
     """
     found = 0.0
     for turned in (image, image.T):
-        thin: Pixels = np.ascontiguousarray(turned[:: 1 + len(turned) // MOST_LINES])
+        thin = cast("Pixels", np.ascontiguousarray(turned[:: 1 + len(turned) // MOST_LINES]))
         steps = cv2.absdiff(thin[:, 1:], thin[:, :-1])
         total = cv2.reduce(steps, 0, cv2.REDUCE_SUM, dtype=cv2.CV_32F).ravel()
         across = (total / np.float64(len(thin))).astype(np.float32)

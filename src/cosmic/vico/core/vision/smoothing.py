@@ -117,8 +117,11 @@ def _curve(s: Floats, line: Floats, at: Floats) -> Floats:
     width = gap[index]
     part = (at - s[index])[:, None] / width
     rest = 1.0 - part
-    first, last, mean_slope = line[index], line[index + 1], chord[index]
-    bend = rest * (slope[index] - mean_slope) - part * (slope[index + 1] - mean_slope)
+    after = index + 1
+    first, last = line.take(index, axis=0), line.take(after, axis=0)
+    mean_slope = chord.take(index, axis=0)
+    bend = rest * (slope.take(index, axis=0) - mean_slope)
+    bend -= part * (slope.take(after, axis=0) - mean_slope)
     return np.asarray(rest * first + part * last + part * rest * width * bend)
 
 
