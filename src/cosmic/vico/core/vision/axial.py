@@ -14,21 +14,25 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import (
-    binary_erosion,
     correlate1d,
-    gaussian_filter1d,
     label,
     maximum_filter1d,
     maximum_position,
-    median_filter,
     minimum_filter1d,
     uniform_filter1d,
 )
 
-from cosmic.vico.core.vision.grey import Floats, Floats32, middle
+from cosmic.vico.core.vision.grey import Floats, Floats32, middle, middles
 from cosmic.vico.core.vision.profiles import Flags, Scene, sample
 from cosmic.vico.core.vision.refine import STEP_PX, Course
-from cosmic.vico.core.vision.smoothing import arc_lengths, directions, resampled
+from cosmic.vico.core.vision.smoothing import (
+    arc_lengths,
+    directions,
+    eroded,
+    levelled,
+    resampled,
+    softened,
+)
 
 GAP = "the ground shines through in one place: it may be two fibres end to end"
 DOUBLED = "a stretch of it is denser than the rest: two fibres may overlap there"
@@ -143,9 +147,7 @@ def joints(scene: Scene, course: Course) -> Joints:
     notches = [_notch(height, across, (seen, free), course.width, blur, turn) for turn in (-1, 1)]
     # Dust beside a fibre is no step: it comes and goes within a width.
     size = 2 * max(int(course.width), DUST_PX) + 1
-    level, weight, side = (
-        median_filter(each, size, mode="nearest") for each in (inner, mass, side)
-    )
+    level, weight, side = (levelled(each, size) for each in (inner, mass, side))
     steps = (
         (level, CONTRAST_STEP),
         (weight, WIDTH_STEP),
@@ -181,7 +183,7 @@ def _seen(course: Course, flags: Flags, line: Floats, blur: float) -> Flags:
     """Return the points with a flag all around, away from the ends."""
     s, at = arc_lengths(course.line), arc_lengths(line)
     good = np.interp(at, s, flags.astype(float)) > 0.99
-    good = binary_erosion(good, iterations=max(1, int(0.5 * course.width)))
+    good = eroded(good, max(1, int(0.5 * course.width)))
     skip = int(np.ceil(0.75 * course.width + 3.0 * blur))
     good[:skip] = good[-skip:] = False
     return np.asarray(good, dtype=np.bool_)
@@ -211,8 +213,8 @@ def _heights(
 
 def _uneven(values: Floats, blur: float, window: int) -> Floats:
     """Return values about as fine as the image is sharp, without what changes slowly."""
-    fine = gaussian_filter1d(values, 0.7 * blur, mode="nearest")
-    return np.asarray(fine - median_filter(fine, window, mode="nearest"))
+    fine = softened(values, 0.7 * blur)
+    return np.asarray(fine - levelled(fine, window))
 
 
 def _notch(
@@ -259,7 +261,7 @@ def _abrupt(
     step = correlate1d(
         values / typical, kernel / np.abs(kernel @ np.sign(away)), axis=1, mode="nearest"
     )
-    spread = 1.4826 * np.median(np.abs(step[:, seen]), axis=1)
+    spread = 1.4826 * middles(np.abs(step[:, seen]))
     least = ABRUPT * np.array([1.0, 1.0, 0.7])
     many = max(1.0, math.sqrt(2.0 * math.log(max(int(seen.sum()), 2))) / MANY)
     clear = np.abs(step) / (many * ABRUPT_TIMES * np.maximum(spread, least))[:, None]
@@ -285,9 +287,9 @@ def _kinked(line: Floats, aside_px: Floats, seen: Flags, width: float, blur: flo
     first, last = there - before, after - there
     cross = first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0]
     angle = np.arctan2(cross, (first * last).sum(axis=1))
-    angle = gaussian_filter1d(angle, 0.25 * size, mode="nearest")
-    angle -= median_filter(angle, 6 * size + 1, mode="nearest")
-    whole = binary_erosion(seen, iterations=size // 2)
+    angle = softened(angle, 0.25 * size)
+    angle -= levelled(angle, 6 * size + 1)
+    whole = eroded(seen, size // 2)
     values = np.zeros(len(line))
     values[size:-size] = np.abs(angle)
     if whole.sum() <= size:
@@ -320,10 +322,10 @@ def _stepped(values: Floats, seen: Flags, width: float, blur: float, least: floa
         return found
     mean = uniform_filter1d(values, size, mode="nearest")
     step = mean[2 * apart :] - mean[: -2 * apart]
-    whole = binary_erosion(seen, iterations=apart + size // 2)[apart:-apart]
+    whole = eroded(seen, apart + size // 2)[apart:-apart]
     if whole.sum() < size:
         return found
     # What a slope gives at both sides of a step belongs to no step.
-    step = step - median_filter(step, 4 * size + 1, mode="nearest")
+    step = step - levelled(step, 4 * size + 1)
     found[:, apart:-apart] = np.where(whole, np.abs(step) / _limits(step[whole], least), 0.0)
     return found

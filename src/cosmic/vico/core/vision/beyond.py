@@ -8,7 +8,7 @@ the fibre comes from they are left out, and so is what belongs to other fibres.
 from typing import Final
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import maximum_filter1d, median_filter
 
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.grey import Floats, Mask, middle
@@ -56,7 +56,7 @@ def soft(course: Course) -> float:
 
 def _rays(scene: Scene, course: Course, at: int, explained: Mask) -> float:
     line = course.line if at else course.line[::-1]
-    count = int(np.clip(round(0.6 * course.width), 3, max(3, len(line) // 3)))
+    count = min(max(round(0.6 * course.width), 3), max(3, len(line) // 3))
     out = line[-1] - line[-1 - min(count, len(line) - 1)]
     blur = course.edge_blur_px
     first = 0.5 * course.width + 2.0 * blur + 2.0
@@ -108,10 +108,7 @@ def _above(mean: Floats, known: Flags) -> Floats:
 
 def _widest(values: Floats) -> Floats:
     """Return the largest of each ray and its neighbours: what goes on may bend."""
-    reach = RAYS // 30
-    return np.asarray(
-        np.max([np.roll(values, shift) for shift in range(-reach, reach + 1)], axis=0)
-    )
+    return np.asarray(maximum_filter1d(values, 2 * (RAYS // 30) + 1, mode="wrap"))
 
 
 def _spread(values: Floats) -> float:

@@ -8,7 +8,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.spatial import cKDTree
 
 from cosmic.vico.core.vision.ends import EndKind
-from cosmic.vico.core.vision.grey import Floats
+from cosmic.vico.core.vision.grey import Floats, middle, middles, quantile
 from cosmic.vico.core.vision.profiles import Scene, sample
 from cosmic.vico.core.vision.refine import STEP_PX, Course
 
@@ -28,8 +28,8 @@ EDGING = "it lies along the edge of something wider"
 DIRTY_END = "at an end its edges are not seen: dirt may lie there"
 DRAWN = "it is as straight and as even as a line drawn into the picture: a scale bar, or a frame"
 SHARP = "it bends more sharply than its own width"
-# Of stretches along a fibre, what so many per cent differ by is its own unevenness.
-OWN_UNEVENNESS = 90.0
+# Of stretches along a fibre, what such a share differ by at most is its own unevenness.
+OWN_UNEVENNESS = 0.9
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ def doubts_of(course: Course, step: float) -> list[str]:
         end.kind.value for end in course.ends if end.kind not in (EndKind.FREE, EndKind.HIDDEN)
     ]
     seen = course.good
-    typical = float(np.median(course.contrast[seen])) if seen.any() else 0.0
+    typical = middle(course.contrast[seen]) if seen.any() else 0.0
     hidden_px = longest_gap(seen) * STEP_PX
     blurred_px = max(LIMITS.blur_px, LIMITS.blur_of_width * course.width)
     reasons = (
@@ -96,7 +96,7 @@ def fades(course: Course, typical: float) -> bool:
     skip = int(np.ceil((1.0 + 2.0 * course.blur_px) / STEP_PX))
     count = max(3, int(1.5 * course.width / STEP_PX))
     parts = (course.contrast[skip : skip + count], course.contrast[-skip - count : -skip])
-    return any(len(part) > 0 and float(np.median(part)) < LIMITS.fade * typical for part in parts)
+    return any(len(part) > 0 and middle(part) < LIMITS.fade * typical for part in parts)
 
 
 def dirty_end(course: Course) -> bool:
@@ -125,14 +125,14 @@ def uneven_ends(course: Course) -> float:
     ends = [_missing(each[: 2 * count], count) for each in (course.contrast, course.contrast[::-1])]
     own = np.concatenate([_missing(each, count) for each in (inner, inner[::-1])])
     more = abs(float(ends[0][0] - ends[1][0]))
-    return max(0.0, more - float(np.percentile(own, OWN_UNEVENNESS)))
+    return max(0.0, more - quantile(own, OWN_UNEVENNESS))
 
 
 def _missing(values: Floats, count: int) -> Floats:
     """Return how many pixels stretches of `count` points miss, by the height of the next one."""
     windows = sliding_window_view(values, count)
     first = np.arange(0, len(values) - 2 * count + 1, max(1, count // 4))
-    usual = np.maximum(np.median(windows[first + count], axis=1), 1e-6)
+    usual = np.maximum(middles(windows[first + count]), 1e-6)
     return np.asarray(STEP_PX * np.maximum(1.0 - windows[first] / usual[:, None], 0.0).sum(axis=1))
 
 
@@ -141,8 +141,8 @@ def width_spread(course: Course) -> float:
     widths = course.widths[np.isfinite(course.widths)]
     if len(widths) < 4:
         return 1.0
-    low, high = np.percentile(widths, (16, 84))
-    return float(0.5 * (high - low) / max(float(np.median(widths)), 1e-6))
+    low, high = quantile(widths, 0.16), quantile(widths, 0.84)
+    return 0.5 * (high - low) / max(middle(widths), 1e-6)
 
 
 def longest_gap(seen: np.ndarray) -> int:
@@ -207,5 +207,5 @@ def is_drawn(scene: Scene, course: Course) -> bool:
     x, y = (course.line[:, axis].astype(np.float32)[None] for axis in (0, 1))
     levels = sample(scene.image, x, y)[0].astype(np.float64)
     inner = levels[len(levels) // 8 : len(levels) - len(levels) // 8]
-    spread = 1.4826 * float(np.median(np.abs(inner - np.median(inner))))
+    spread = 1.4826 * middle(np.abs(inner - middle(inner)))
     return spread < LIMITS.even_of_noise * course.noise

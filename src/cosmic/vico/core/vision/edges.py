@@ -6,15 +6,13 @@ from typing import Final, NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.vico.core.vision.grey import Floats, Floats32, middle, middles, quantile
 from cosmic.vico.hw.interface import Pixels
 
-Floats = npt.NDArray[np.float64]
-Floats32 = npt.NDArray[np.float32]
 Pair = tuple[float, float]
 
-DARKEST_PERCENT: Final = 2.0
+DARKEST: Final = 0.02
 LEAST_CONTRAST: Final = 0.25
 BODY_LEVEL: Final = 0.4
 CLIP_PX: Final = 0.3
@@ -142,10 +140,10 @@ def turned(
 
 def levels(frame: Frame) -> Levels | None:
     """Return the greys of body and ground; None where nothing is dark enough to be a tool."""
-    low, high = np.percentile(frame.pixels[::2, ::2], [DARKEST_PERCENT, 100.0 - DARKEST_PERCENT])
-    ground = float(np.median(frame.pixels[frame.pixels >= 0.5 * (low + high)]))
-    found = Levels(float(low), ground)
-    return found if found.contrast > max(LEAST_CONTRAST * ground, 8.0) else None
+    some = frame.pixels[::2, ::2].astype(np.float64)
+    low, high = quantile(some, DARKEST), quantile(some, 1.0 - DARKEST)
+    found = Levels(low, middle(frame.pixels[frame.pixels >= 0.5 * (low + high)]))
+    return found if found.contrast > max(LEAST_CONTRAST * found.ground, 8.0) else None
 
 
 def blobs(frame: Frame, greys: Levels, width: float) -> list[Blob]:
@@ -178,12 +176,12 @@ def measure(frame: Frame, greys: Levels, blob: Blob, width: float) -> Body | Non
     across = blob.high - blob.low
     inside = max(4, round(0.45 * across))
     margin = round(0.22 * across)
-    middle = range(blob.low + margin, blob.high - margin + 1)
-    front = _edge(frame.pixels, greys, blob.front, middle, (reach, reach))
+    inner = range(blob.low + margin, blob.high - margin + 1)
+    front = _edge(frame.pixels, greys, blob.front, inner, (reach, reach))
     along = range(blob.back, max(blob.back, blob.front - round(0.4 * width)))
-    flat = np.ascontiguousarray(frame.pixels.T)
+    flat = frame.pixels.T
     high = _edge(flat, greys, blob.high, along, (inside, reach))
-    mirrored = np.ascontiguousarray(flat[:, ::-1])
+    mirrored = flat[:, ::-1]
     last = flat.shape[1] - 1
     low = _edge(mirrored, greys, last - blob.low, along, (inside, reach))
     if front is None or high is None or low is None:
@@ -197,39 +195,39 @@ def _edge(
 ) -> Line | None:
     """Fit the edge that lies near a column, over some rows: dark before it, light after it."""
     rows, columns = pixels.shape
-    at = np.array([each for each in places if 1 <= each < rows - 1])
+    at = np.arange(max(1, places.start), min(rows - 1, places.stop))
     first, last = max(0, near - reach[0]), min(columns, near + reach[1] + 1)
     if len(at) < FEWEST_PROFILES or near - first < 4 or last - near < 4:
         return None
-    part = pixels[:, first:last]
-    profiles = (part[at - 1] + part[at] + part[at + 1]) / 3.0
-    inner = np.median(profiles[:, : max(3, (near - first) // 2)], axis=1)
-    outer = np.median(profiles[:, -max(3, (last - near) // 2) :], axis=1)
+    part = np.ascontiguousarray(pixels[at[0] - 1 : at[-1] + 2, first:last])
+    profiles = (part[:-2] + part[1:-1] + part[2:]) / 3.0
+    inner = middles(profiles[:, : max(3, (near - first) // 2)])
+    outer = middles(profiles[:, -max(3, (last - near) // 2) :])
     # Where a fibre lies before the edge, the ground of the rest is what it would be seen against.
     clear = np.abs(outer - greys.ground) < 0.15 * greys.contrast
-    middle = 0.5 * (inner + np.where(clear, outer, greys.ground))
-    light = profiles >= middle[:, None]
+    half = 0.5 * (inner + np.where(clear, outer, greys.ground))
+    light = profiles >= half[:, None]
     crossing = np.argmax(light, axis=1)
     usable = crossing > 0
     if usable.sum() < FEWEST_PROFILES:
         return None
     index, chosen = crossing[usable], np.flatnonzero(usable)
     before, after = profiles[chosen, index - 1], profiles[chosen, index]
-    part_px = (middle[usable] - before) / np.maximum(after - before, 1e-6)
+    part_px = (half[usable] - before) / np.maximum(after - before, 1e-6)
     position = first + index - 1 + part_px
     return _straight(at[usable].astype(np.float64), position.astype(np.float64), len(at))
 
 
 def _straight(abscissa: Floats, position: Floats, asked: int) -> Line | None:
     """Fit a line, leaving out what lies off it."""
-    away = np.abs(position - np.median(position))
-    kept = away <= max(3.0, 4.0 * float(np.median(away)))
+    away = np.abs(position - middle(position))
+    kept = away <= max(3.0, 4.0 * middle(away))
     for _ in range(3):
         if kept.sum() < FEWEST_PROFILES:
             return None
         fit = _Fit.of(abscissa[kept], position[kept])
         error = np.abs(fit.error(abscissa, position))
-        kept = error <= max(CLIP_PX, 3.0 * 1.4826 * float(np.median(error[kept])))
+        kept = error <= max(CLIP_PX, 3.0 * 1.4826 * middle(error[kept]))
     count = int(kept.sum())
     if count < FEWEST_PROFILES:
         return None

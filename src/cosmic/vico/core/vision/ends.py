@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from cosmic.vico.core.vision.grey import Floats, middle
 from cosmic.vico.core.vision.profiles import Flags, Scene, sample, within
-from cosmic.vico.core.vision.smoothing import directions
+from cosmic.vico.core.vision.smoothing import directions, softened
 
 # Grey levels: below, there is nothing of which a half could be told.
 LEAST_HEIGHT = 1e-3
@@ -68,7 +67,7 @@ def find_end(scene: Scene, line: Floats, level: Level) -> End:
     values = scene.sign * (sample(scene.image, x, y) - level.ground)
     mean = values.mean(axis=1, dtype=np.float64)
     blur = max(1.0, min(4.0, 12.0 * level.noise / max(level.contrast, 1e-6) / np.sqrt(half)))
-    mean = gaussian_filter1d(mean, blur / spacing * 0.8, mode="nearest")
+    mean = softened(mean, blur / spacing * 0.8)
     return crossing(along, mean, inside, plateau(mean), level)
 
 
@@ -80,7 +79,7 @@ def plateau(mean: Floats) -> float:
 
 def leaving(line: Floats, width: float) -> Floats:
     """Return the direction in which a line leaves its end."""
-    count = int(np.clip(round(0.6 * width), 3, max(3, len(line) // 3)))
+    count = min(max(round(0.6 * width), 3), max(3, len(line) // 3))
     return np.asarray(
         directions(line[-count - 1 :]).mean(axis=0) if len(line) > 3 else directions(line)[-1]
     )

@@ -11,7 +11,7 @@ from cosmic.vico.core.vision import axial, certainty, checks, picture_edge
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
-from cosmic.vico.core.vision.grey import Floats, Mask, grey_image
+from cosmic.vico.core.vision.grey import Floats, Mask, grey_image, middle
 from cosmic.vico.core.vision.joining import Strand, strands
 from cosmic.vico.core.vision.measures import (
     grasp_points,
@@ -122,7 +122,7 @@ def long_enough(strand: Strand, factor: int, least: float) -> bool:
 def slender(course: Course, least: float) -> bool:
     """Return whether what was measured is long and narrow."""
     length = float(arc_lengths(course.line)[-1])
-    typical = float(np.median(course.contrast[course.good])) if course.good.any() else 0.0
+    typical = middle(course.contrast[course.good]) if course.good.any() else 0.0
     long = length >= max(least, SLENDER * course.width)
     return long and typical > 0 and checks.edging(course, typical) < 0.5
 
@@ -160,7 +160,7 @@ def fibre(
         doubts.append(certainty.IMPROBABLE)
     width_std = width_deviation(course, section)
     free = clear_around(scene, line, width)
-    contrast = float(np.median(course.contrast[course.good]))
+    contrast = middle(course.contrast[course.good])
     return Fibre(
         centre_line_px=frozen(line),
         widths_px=frozen(widths),
@@ -318,17 +318,16 @@ def explained_by(scene: Scene, lines: list[Floats], widths: list[float]) -> Mask
 
 def left_over(scene: Scene, lines: list[Floats], widths: list[float], explained: Mask) -> set[int]:
     """Return the fibres to which something large clings that no fibre explains."""
-    rest = ((scene.taken > 0) & (explained == 0)).astype(np.uint8)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
-    areas = stats[:, cv2.CC_STAT_AREA].copy()
-    areas[0] = 0
+    rest = (scene.taken > 0) & (explained == 0)
+    _, labels = cv2.connectedComponents(rest.view(np.uint8), connectivity=8)
+    areas = np.bincount(labels[rest])
     found: set[int] = set()
     if not (areas >= 12).any():
         return found
     for index, (line, width) in enumerate(zip(lines, widths, strict=True)):
         around = np.zeros(rest.shape, np.uint8)
         strip(around, scene.reduced(line), width / scene.factor + 8.0)
-        beside = np.unique(labels[(around > 0) & (rest > 0)])
+        beside = np.unique(labels[(around > 0) & rest])
         if len(beside) and int(areas[beside].max()) > max(11.0, 3.0 * (width / scene.factor) ** 2):
             found.add(index)
     return found

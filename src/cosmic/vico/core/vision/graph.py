@@ -10,6 +10,8 @@ import numpy.typing as npt
 from cosmic.vico.core.vision.grey import Floats, Floats32, Mask, middle
 from cosmic.vico.core.vision.smoothing import arc_lengths
 
+Flags = npt.NDArray[np.bool_]
+
 FIRST, SECOND, BOTH = 1, 2, 3
 
 # The neighbours of a pixel count 1, 2, 4, ... clockwise from the upper left one.
@@ -153,23 +155,33 @@ def build_graph(mask: Mask, most: int) -> Graph | None:
     framed = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
     half_widths = cv2.distanceTransform(framed, cv2.DIST_L2, 5)[1:-1, 1:-1]
     skeleton = skeletonize(mask)
-    around = cv2.filter2D(skeleton, -1, np.ones((3, 3)), borderType=cv2.BORDER_CONSTANT)
-    forks = ((skeleton > 0) & (around > 3)).astype(np.uint8)
-    count, found, _, centres = cv2.connectedComponentsWithStats(forks, connectivity=8)
+    around = cv2.boxFilter(skeleton, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
+    lines = skeleton != 0
+    forks = lines & (around > 3)
+    count, found = cv2.connectedComponents(forks.view(np.uint8), connectivity=8)
     labels = np.asarray(found, dtype=np.int32)
     if count - 1 > most:
         return None
-    pieces = ((skeleton > 0) & (forks == 0)).astype(np.uint8)
-    branches = [branch(pixels, labels) for pixels in paths(pieces)]
-    nodes = [np.asarray(centre, dtype=float) for centre in centres[1:]]
+    branches = [branch(pixels, labels) for pixels in paths(lines & ~forks)]
+    nodes = centres(forks, labels)
     for each in branches:
         with_nodes(each, nodes)
     return Graph(branches, nodes, np.asarray(half_widths, dtype=np.float32))
 
 
-def paths(pieces: Mask) -> list[list[tuple[int, int]]]:
+def centres(forks: Flags, labels: npt.NDArray[np.int32]) -> list[Floats]:
+    """Return the middle of each fork, x and y, by its label from 1 on."""
+    rows, columns = np.nonzero(forks)
+    of = labels[rows, columns]
+    areas = np.bincount(of)[1:]
+    x, y = (np.bincount(of, each)[1:] / areas for each in (columns, rows))
+    return list(np.column_stack([x, y]))
+
+
+def paths(pieces: Flags) -> list[list[tuple[int, int]]]:
     """Return the pixels (row, column) of each piece in order."""
-    left = {(int(row), int(column)) for row, column in zip(*np.nonzero(pieces), strict=True)}
+    rows, columns = np.nonzero(pieces)
+    left = set(zip(rows.tolist(), columns.tolist(), strict=True))
     found = []
     while left:
         start = next(iter(left))

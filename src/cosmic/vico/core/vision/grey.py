@@ -1,6 +1,6 @@
 """Images as machine vision takes them: one layer, 8 or 16 bit."""
 
-from typing import cast
+from typing import TypeVar, cast
 
 import cv2
 import numpy as np
@@ -11,6 +11,7 @@ from cosmic.vico.hw.interface import Pixels
 
 Floats = npt.NDArray[np.float64]
 Floats32 = npt.NDArray[np.float32]
+FloatsOrFloats32 = TypeVar("FloatsOrFloats32", Floats, Floats32)
 Mask = npt.NDArray[np.uint8]
 
 LEAST_SIDE_PX = 16
@@ -18,6 +19,8 @@ LEAST_SIDE_PX = 16
 MOST_SIDE_PX = 32_766
 LAYERS = 3
 TOP_LEVEL = 65_535
+FEW = 256
+"""Of fewer numbers sorting finds the middle soonest."""
 
 
 def grey_image(image: npt.NDArray[np.generic]) -> Pixels:
@@ -93,9 +96,38 @@ def _levels(image: npt.NDArray[np.generic], said: str) -> Pixels:
 
 
 def middle(values: npt.NDArray[np.floating]) -> float:
-    """Return the median of some numbers, at least one; for few it is quicker than numpy's."""
-    half = values.size // 2
-    if values.size % 2:
-        return float(np.partition(values, half, axis=None)[half])
-    pair = np.partition(values, (half - 1, half), axis=None)[half - 1 : half + 1]
-    return 0.5 * (float(pair[0]) + float(pair[1]))
+    """Return the median of some numbers, at least one; it is quicker than numpy's."""
+    flat = values.flatten()
+    half = flat.size // 2
+    if flat.size < FEW:
+        flat.sort()
+    else:
+        # One place alone numpy finds several times as fast as two.
+        flat.partition(half)
+    high = float(flat[half])
+    if flat.size % 2:
+        return high
+    return 0.5 * (float(flat[half - 1] if flat.size < FEW else flat[:half].max()) + high)
+
+
+def middles(values: FloatsOrFloats32) -> FloatsOrFloats32:
+    """Return the median of each row of some numbers, in their own type."""
+    ordered = np.sort(values, axis=1)
+    half = values.shape[1] // 2
+    if values.shape[1] % 2:
+        return ordered[:, half]
+    return 0.5 * (ordered[:, half - 1] + ordered[:, half])
+
+
+def quantile(values: npt.NDArray[np.floating], share: float) -> float:
+    """Return what a share of some numbers lies below, as numpy's quantile; it is quicker."""
+    flat = values.flatten()
+    at = (flat.size - 1) * share
+    index = int(at)
+    flat.partition(index)
+    low = flat[index]
+    if index + 1 == flat.size:
+        return float(low)
+    high, part = flat[index + 1 :].min(), at - index
+    step = high - low
+    return float(high - step * (1.0 - part) if part >= 0.5 else low + step * part)

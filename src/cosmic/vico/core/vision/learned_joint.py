@@ -190,19 +190,16 @@ def _convolved(
     before = apart * ((len(kernel) - 1) // 2)
     padded = np.zeros((strips, n + apart * (len(kernel) - 1), channels), np.float32)
     padded[:, before : before + n] = values
-    taps = [padded[:, apart * tap :][:, :n:stride] for tap in range(len(kernel))]
-    flat = np.concatenate(taps, axis=2).reshape(-1, len(kernel) * channels)
-    found = _product(flat, kernel.reshape(-1, kernel.shape[2]))
+    count = strips * -(-n // stride)
+    # In parts that do not wake other threads.
+    size = max(1, IN_ONE_THREAD // kernel.size)
+    parts = -(-count // size)
+    flat = np.zeros((parts * size, len(kernel) * channels), np.float32)
+    rows = flat[:count].reshape(strips, -1, len(kernel), channels)
+    for tap in range(len(kernel)):
+        rows[:, :, tap] = padded[:, apart * tap :][:, :n:stride]
+    product = flat.reshape(parts, size, -1) @ kernel.reshape(-1, kernel.shape[2])
+    found = product.reshape(-1, kernel.shape[2])[:count]
     found += weights[f"{name}_bias"]
     np.maximum(found, 0.0, out=found)
     return np.asarray(found.reshape(strips, -1, kernel.shape[2]))
-
-
-def _product(rows: Floats32, kernel: Floats32) -> Floats32:
-    """Return `rows @ kernel`, without waking other threads."""
-    size = max(1, IN_ONE_THREAD // kernel.size)
-    parts = -(-len(rows) // size)
-    padded = np.zeros((parts * size, rows.shape[1]), np.float32)
-    padded[: len(rows)] = rows
-    found = padded.reshape(parts, size, -1) @ kernel
-    return np.asarray(found.reshape(-1, kernel.shape[1])[: len(rows)])

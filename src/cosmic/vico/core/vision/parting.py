@@ -22,7 +22,7 @@ from cosmic.vico.core.vision.grey import Floats, Mask
 from cosmic.vico.core.vision.joining import AMBIGUOUS, FOLDED, Strand, strands
 from cosmic.vico.core.vision.profiles import Scene
 from cosmic.vico.core.vision.refine import Course, neighbours_of, refine
-from cosmic.vico.core.vision.relief import hat, stands_out, threshold
+from cosmic.vico.core.vision.relief import hats, stands_out, threshold
 from cosmic.vico.core.vision.smoothing import arc_lengths
 
 BUNDLED: Final = "other fibres run close beside it, as in a bundle"
@@ -173,7 +173,7 @@ def _mask(scene: Scene, low: np.ndarray, high: np.ndarray, depth: float) -> Mask
     part = cv2.GaussianBlur(scene.image[low[1] : high[1], low[0] : high[0]], (5, 5), 1.0)
     side = max(3, min(WIDEST_PX, int(0.6 * min(part.shape))) | 1)
     kind = cv2.MORPH_TOPHAT if scene.sign > 0 else cv2.MORPH_BLACKHAT
-    height = stands_out(hat(np.asarray(part, dtype=np.float32), side, kind))
+    height = stands_out(*hats(np.asarray(part, dtype=np.float32), side, [kind]))
     level = threshold(height, LEAST_LEVELS * scene.step)
     strongest = cv2.dilate(height, np.ones((11, 11), np.uint8))
     return np.asarray(height > np.maximum(level, depth * strongest), dtype=np.uint8)

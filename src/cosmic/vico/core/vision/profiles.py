@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter1d
 
-from cosmic.vico.core.vision.grey import Floats, Floats32, middle
-from cosmic.vico.core.vision.smoothing import directions
+from cosmic.vico.core.vision.grey import Floats, Floats32, middle, middles
+from cosmic.vico.core.vision.smoothing import directions, softened
 
 Flags = npt.NDArray[np.bool_]
 
@@ -132,8 +131,12 @@ def cross_sections(
     )
     values = sample(scene.image, x, y)
     inside = np.abs(across) < 0.5 * width + margin
-    other = sample(scene.taken, scene.reduced_by_axis(x), scene.reduced_by_axis(y))
-    clear = inside[None, :] | (other < 0.25)
+    clear = np.ones(values.shape, np.bool_)
+    beside = int(np.argmax(inside))
+    if scene.taken.size > 1:
+        for part in (slice(beside), slice(len(across) - beside, None)):
+            at = (scene.reduced_by_axis(each[:, part]) for each in (x, y))
+            clear[:, part] = sample(scene.taken, *at) < 0.25
     if (line < reach + 1.0).any() or (line > scene.corner - reach - 1.0).any():
         clear &= within(scene, x, y)
     ground, tilt, noise = ground_of(values, clear & ~inside[None, :], across)
@@ -145,14 +148,13 @@ def cross_sections(
 
 def ground_of(values: Floats32, free: Flags, across: Floats32) -> tuple[Floats32, Floats, float]:
     """Return the ground under each cross section, sloping from side to side, and its noise."""
-    sides = []
-    seen = []
-    for side in (across < 0, across > 0):
+    raw = np.empty((4, len(values)))
+    for number, side in enumerate((across < 0, across > 0)):
         part = (free & side[None, :]).astype(np.float32)
-        number = part.sum(axis=1)
-        total = np.einsum("ij,ij->i", values, part).astype(np.float64)
-        sides.append(gaussian_filter1d(total, 6.0, mode="nearest"))
-        seen.append(gaussian_filter1d(number.astype(float), 6.0, mode="nearest"))
+        raw[number] = np.einsum("ij,ij->i", values, part)
+        raw[number + 2] = part.sum(axis=1)
+    soft = softened(raw, 6.0)
+    sides, seen = soft[:2], soft[2:]
     levels = [total / np.maximum(count, 1e-9) for total, count in zip(sides, seen, strict=True)]
     both = (sides[0] + sides[1]) / np.maximum(seen[0] + seen[1], 1e-9)
     # Where no ground is seen at all, what is seen elsewhere along the fibre serves.
@@ -197,14 +199,13 @@ def typical_section(height: Floats32, good: Flags) -> Floats:
     """Return the median cross section, 1 at its highest."""
     rows = height[good] if good.any() else height
     rows = rows[:: len(rows) // 100 + 1]
-    typical = np.median(rows, axis=0)
+    typical = middles(rows.T)
     return np.asarray(typical / max(float(typical.max()), 1e-9))
 
 
 def level_crossing(mean: Floats, across: Floats32, level: float, side: int) -> float:
     """Return the outermost point on one side at which the typical section has a level."""
-    order = np.argsort(side * across)
-    x, y = across[order], mean[order]
+    x, y = across[::side], mean[::side]
     above = np.nonzero(y[:-1] >= level)[0]
     above = above[side * x[above] > -0.5 * side * x[-1]]
     for index in above[::-1]:
@@ -221,11 +222,11 @@ def find_edges(profiles: Profiles, height: Floats32, good: Flags, width: float) 
     mean = np.where(near, typical_section(height, good), 0.0)
     weight = mean / max(float((mean**2).sum()), 1e-9)
     contrast = (height @ weight.astype(np.float32)).astype(np.float64)
-    contrast = gaussian_filter1d(contrast, 3.0, mode="nearest")
-    scaled = height / np.maximum(contrast, 1e-6)[:, None].astype(np.float32)
+    contrast = softened(contrast, 3.0)
+    whole = np.maximum(contrast, 1e-6)[:, None].astype(np.float32)
     expected = [level_crossing(mean, across, 0.5, side) for side in (-1, 1)]
     found = [
-        edge_near(scaled, across, point, side, 0.35 * width + 1.0)
+        edge_near(height, whole, across, point, side, 0.35 * width + 2.0)
         for point, side in zip(expected, (-1, 1), strict=True)
     ]
     inner = [level_crossing(mean, across, 0.75, side) for side in (-1, 1)]
@@ -234,17 +235,27 @@ def find_edges(profiles: Profiles, height: Floats32, good: Flags, width: float) 
     return Edges(found[0], found[1], contrast, mean, steep / 1.349)
 
 
-def edge_near(scaled: Floats32, across: Floats32, point: float, side: int, most: float) -> Floats:
-    """Return where each section falls below half, outwards, nearest to `place`; NaN if nowhere."""
-    if not np.isfinite(point):
-        return np.full(len(scaled), np.nan)
+def edge_near(
+    height: Floats32, whole: Floats32, across: Floats32, point: float, side: int, most: float
+) -> Floats:
+    """Return where each section falls below half of `whole`, outwards, nearest to a point.
+
+    NaN where it does so nowhere within `most` of it.
+    """
+    start = across[:-1] if side > 0 else across[1:]
+    away = np.abs(start - np.float32(point))
+    near = np.flatnonzero(away <= most)
+    if not near.size:
+        return np.full(len(height), np.nan)
+    part = slice(int(near[0]), int(near[-1]) + 1)
+    scaled = height[:, part.start : part.stop + 1] / whole
     inner, outer = (scaled[:, :-1], scaled[:, 1:]) if side > 0 else (scaled[:, 1:], scaled[:, :-1])
     falls = (inner >= 0.5) & (outer < 0.5)
-    start = across[:-1] if side > 0 else across[1:]
-    away = np.where(falls, np.abs(start - np.float32(point))[None, :], np.float32(np.inf))
-    best = np.argmin(away, axis=1)
+    apart = np.where(falls, away[None, part], np.float32(np.inf))
+    best = np.argmin(apart, axis=1)
     rows = np.arange(len(scaled))
-    drop = np.maximum(inner[rows, best] - outer[rows, best], 1e-9)
-    share = (inner[rows, best] - 0.5) / drop * (across[1] - across[0])
-    found = (start[best] + side * share).astype(np.float64)
-    return np.where(away[rows, best] <= most + 1.0, found, np.nan)
+    high = inner[rows, best]
+    drop = np.maximum(high - outer[rows, best], 1e-9)
+    share = (high - 0.5) / drop * (across[1] - across[0])
+    found = (start[part][best] + side * share).astype(np.float64)
+    return np.where(np.isfinite(apart[rows, best]), found, np.nan)

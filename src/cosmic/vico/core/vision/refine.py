@@ -182,8 +182,9 @@ def move(
     used = weights > 0
     if used.sum() > 8:
         typical = middle(rest[used])
-        limit = 4.0 * 1.4826 * typical + 0.1
-        line = smooth(target, np.where(rest > limit, 0.0, weights), wave)
+        off = rest > 4.0 * 1.4826 * typical + 0.1
+        if (off & used).any():
+            line = smooth(target, np.where(off, 0.0, weights), wave)
         course.scatter_px = 1.2 * typical
     course.line = line
 
@@ -197,7 +198,7 @@ def measure(scene: Scene, course: Course, neighbours: Neighbours) -> bool:
     free = ~excluded(course, neighbours)
     typical = middle(profiles.height[::4, np.abs(profiles.across) < 0.4 * course.width])
     ratio = profiles.noise / max(typical, 1e-6)
-    height = along(profiles, float(np.clip(6 * ratio, 0.8, 4.0)))
+    height = along(profiles, min(max(6 * ratio, 0.8), 4.0))
     if not free.any():
         return False
     edges = find_edges(profiles, height, free, course.width)
@@ -289,7 +290,7 @@ def ended(line: Floats, beyond: float, width: float) -> Floats:
         keep = s < total - 1e-6
         last = np.array([np.interp(total, s, line[:, axis]) for axis in (0, 1)])
         return np.concatenate([line[keep], last[None]])
-    count = int(np.clip(round(0.6 * width), 3, max(3, len(line) // 3)))
+    count = min(max(round(0.6 * width), 3), max(3, len(line) // 3))
     out = line[-1] - line[-1 - min(count, len(line) - 1)]
     out /= max(float(np.linalg.norm(out)), 1e-9)
     return np.concatenate([line, (line[-1] + beyond * out)[None]])

@@ -1,12 +1,14 @@
 """Where an image is darker or lighter than its ground, found at a quarter of its size."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.vico.core.vision.grey import Floats32, Mask, middle
+from cosmic.vico.core.vision.grey import Floats32, Mask, middle, middles, quantile
 from cosmic.vico.hw.interface import Pixels
 
 # Wider bodies are tools, not fibres: the ground is what remains of them. Full-size pixels.
@@ -26,6 +28,7 @@ LEAST_DIFFERENCE = 0.02
 # Of a hollow fibre: its inside, and it with its walls.
 HOLLOW_PX = 24
 WIDEST_HOLLOW_PX = 48
+LEAST_HOLLOW_AREA = 20
 # Of what stands out: what is less between several is the ground.
 GROUND_SHARE = 0.12
 # What the ground is like around something: of the image, how wide that is, and how much of it must
@@ -83,7 +86,7 @@ class Pieces:
     def of(cls, mask: Mask) -> "Pieces":
         """Return the pieces of a mask."""
         _, labels = cv2.connectedComponents(mask, connectivity=8)
-        points = np.flatnonzero(mask)
+        points = np.flatnonzero(mask != 0)  # of numbers it takes ten times as long as of flags
         found = labels.ravel()[points]
         order = points[np.argsort(found, kind="stable")]
         areas = np.bincount(found)[1:] if len(found) else np.zeros(0, np.intp)
@@ -100,6 +103,34 @@ class Pieces:
         framed = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
         depth = cv2.distanceTransform(framed, cv2.DIST_L2, 3)[1:-1, 1:-1]
         return np.asarray(np.maximum.reduceat(depth.ravel()[self.order], self.firsts))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Raised:
+    """What is darker than the ground, or what is lighter, and where it stands out.
+
+    Attributes
+    ----------
+    height : ndarray, float32
+        Grey levels.
+    level : float
+        Above it something stands out.
+    mask : ndarray of uint8
+        1 where it does; `pieces` are its pieces.
+    """
+
+    lighter: bool
+    height: Floats32
+    level: float
+    mask: Mask
+    pieces: Pieces
+
+    @classmethod
+    def of(cls, height: Floats32, floor: float, *, lighter: bool) -> "Raised":
+        """Return what stands out from noise, and by more than `floor`."""
+        level = threshold(height, floor)
+        mask = (height > level).view(np.uint8)
+        return cls(lighter, height, level, mask, Pieces.of(mask))
 
 
 def reduction(shape: tuple[int, ...]) -> int:
@@ -127,40 +158,38 @@ def find_relief(image: Pixels) -> Relief:
     small = reduced(image, factor)
     widest = max(WIDEST_PX, WIDEST_OF_IMAGE * max(image.shape))
     side = int(min(widest, 0.3 * min(image.shape)) / factor) | 1
-    hats = [
-        (lighter, stands_out(hat(small, max(3, side), kind)))
-        for lighter, kind in ((False, cv2.MORPH_BLACKHAT), (True, cv2.MORPH_TOPHAT))
-    ]
-    floor = LEAST_LEVELS if image.dtype == np.uint8 else LEAST_LEVELS * level_step(image)
-    strongest = max(float(np.percentile(height[::2, ::2], 99.8)) for _, height in hats)
-    floor = max(floor, OF_STRONGEST * strongest)
-    levels = [threshold(height, floor) for _, height in hats]
-    ground = ground_around(
-        small, [height > level for (_, height), level in zip(hats, levels, strict=True)]
+    darker, brighter = (
+        stands_out(each)
+        for each in hats(small, max(3, side), (cv2.MORPH_BLACKHAT, cv2.MORPH_TOPHAT))
     )
-    found = []
-    for (lighter, height), level in zip(hats, levels, strict=True):
-        away = from_ground(small, ground, lighter=lighter)
-        found.append((*fibre_like(height, level, away), lighter, height, level))
+    floor = LEAST_LEVELS if image.dtype == np.uint8 else LEAST_LEVELS * level_step(image)
+    strongest = max(quantile(each[::2, ::2], 0.998) for each in (darker, brighter))
+    floor = max(floor, OF_STRONGEST * strongest)
+    raised = [Raised.of(darker, floor, lighter=False), Raised.of(brighter, floor, lighter=True)]
+    ground = ground_around(small, [each.mask for each in raised])
+    found = [(*fibre_like(each, from_ground(small, ground, each)), each) for each in raised]
     found.sort(key=lambda each: -each[0])
-    masks = [thresholded(height, level) for *_, height, level in found]
-    within = found[1][1] > NO_GROUND and lined(masks[0], masks[1])
-    _, _, lighter, height, _ = found[1 if within else 0]
-    mask = masks[1 if within else 0]
-    crowded = float(mask.mean()) > CROWDED
+    chosen = found[0][2]
+    mask = thresholded(chosen)
+    if found[1][1] > NO_GROUND:
+        walls = thresholded(found[1][2])
+        if lined(mask, walls):
+            chosen, mask = found[1][2], walls
+    crowded = cv2.countNonZero(mask) > CROWDED * mask.size
     hollow = np.zeros_like(mask) if crowded else insides(mask, HOLLOW_PX / factor)
     if hollow.any():
-        away = from_ground(small, ground, lighter=lighter)
+        away = from_ground(small, ground, chosen)
         hollow &= ~ground_between(mask, hollow, np.nan_to_num(away, nan=np.inf), factor)
-    return Relief(factor, lighter, height, mask | hollow, hollow, crowded)
+    return Relief(factor, chosen.lighter, chosen.height, mask | hollow, hollow, crowded)
 
 
-def hat(small: Floats32, side: int, kind: int) -> Floats32:
+def hats(small: Floats32, side: int, kinds: Sequence[int]) -> list[Floats32]:
     """Return what is narrower than `side`; light that falls off goes on beyond the border."""
     edge = min(side // 2 + 1, min(small.shape) - 1)
     framed = np.pad(small, edge, mode="reflect", reflect_type="odd")
-    found = cv2.morphologyEx(framed, kind, np.ones((side, side), np.uint8))
-    return np.asarray(found[edge:-edge, edge:-edge], dtype=np.float32)
+    square = np.ones((side, side), np.uint8)
+    found = (cv2.morphologyEx(framed, kind, square) for kind in kinds)
+    return [np.asarray(each[edge:-edge, edge:-edge], dtype=np.float32) for each in found]
 
 
 def level_step(image: Pixels) -> float:
@@ -177,13 +206,15 @@ def blockiness(image: Pixels) -> float:
     """
     found = 0.0
     for turned in (image, image.T):
-        thin = turned[:: 1 + len(turned) // MOST_LINES]
-        across = np.abs(np.diff(thin.astype(np.float32), axis=1)).mean(axis=0)
+        thin = cast("Pixels", np.ascontiguousarray(turned[:: 1 + len(turned) // MOST_LINES]))
+        steps = cv2.absdiff(thin[:, 1:], thin[:, :-1])
+        total = cv2.reduce(steps, 0, cv2.REDUCE_SUM, dtype=cv2.CV_32F).ravel()
+        across = (total / np.float64(len(thin))).astype(np.float32)
         count = len(across) // BLOCK_PX
         if count < FEWEST_BLOCKS:
             continue
-        by_phase = np.median(across[: count * BLOCK_PX].reshape(count, BLOCK_PX), axis=0)
-        usual = max(float(np.median(by_phase)), LEAST_DIFFERENCE)
+        by_phase = middles(across[: count * BLOCK_PX].reshape(count, BLOCK_PX).T)
+        usual = max(float(middles(by_phase[None])[0]), LEAST_DIFFERENCE)
         found += 0.5 * max(0.0, float(by_phase.max()) / usual - 1.0)
     return found
 
@@ -199,43 +230,52 @@ def threshold(height: Floats32, floor: float) -> float:
     return max(NOISE_TIMES * noise, floor)
 
 
-def ground_around(small: Floats32, covered: list[npt.NDArray[np.bool_]]) -> Floats32:
+def ground_around(small: Floats32, covered: Sequence[Mask]) -> Floats32:
     """Return the ground where nothing stands out, carried on below what does; nan far from any.
 
     As near as enough of it is seen, and again of what the first time has left, so that light that
     falls off to the sides is followed.
     """
-    free = (~(covered[0] | covered[1])).astype(np.float32)
-    ground = np.full(small.shape, np.nan, np.float32)
+    free = ((covered[0] | covered[1]) == 0).astype(np.float32)
+    seen = small * free
+    ground, unknown = seen, np.ones(small.shape, np.bool_)
     for part, least in GROUND_PARTS:
         size = [side // part | 1 for side in small.shape[::-1]]
-        share = np.maximum(cv2.blur(free, size), 1e-6)
-        near = cv2.blur(small * free, size) / share
-        near += cv2.blur((small - near) * free, size) / share
-        ground = np.where(np.isnan(ground) & (share >= least), near, ground).astype(np.float32)
-    return ground
+        share = cv2.blur(free, size)
+        np.maximum(share, 1e-6, out=share)
+        near = cv2.blur(seen, size)
+        near /= share
+        rest = small - near
+        rest *= free
+        near += cv2.blur(rest, size) / share
+        ground = near if unknown.all() else np.where(unknown, near, ground)
+        unknown &= share < least
+        if not unknown.any():
+            return np.asarray(ground, dtype=np.float32)
+    return np.where(unknown, np.float32(np.nan), ground)
 
 
-def from_ground(small: Floats32, ground: Floats32, *, lighter: bool) -> Floats32:
+def from_ground(small: Floats32, ground: Floats32, raised: Raised) -> Floats32:
     """Return by how much each place is lighter, or darker, than the ground elsewhere."""
-    return np.asarray(small - ground if lighter else ground - small, dtype=np.float32)
+    return np.asarray(small - ground if raised.lighter else ground - small, dtype=np.float32)
 
 
-def fibre_like(height: Floats32, level: float, away: Floats32) -> tuple[float, float]:
+def fibre_like(raised: Raised, away: Floats32) -> tuple[float, float]:
     """Return how much of what stands out is long and narrow, and what part of it is no ground.
 
     Length counts times strength, which is the height as far as a place differs from the ground
     elsewhere: what lies between dark fibres near each other is long and narrow, and lighter than
     these, but no lighter than other ground. Where no ground is seen the height counts.
     """
-    mask = (height > level).astype(np.uint8)
-    pieces = Pieces.of(mask)
+    pieces = raised.pieces
     if not len(pieces.areas):
         return 0.0, 0.0
-    thickness = np.maximum(2.0 * pieces.deepest(mask) - 1.0, 1.0)
+    thickness = np.maximum(2.0 * pieces.deepest(raised.mask) - 1.0, 1.0)
     slender = np.maximum(pieces.areas / thickness - 4.0 * thickness - 4.0, 0.0)
-    strength = np.maximum(np.fmin(height, away), 0.0)
-    strong, high = (float((slender * pieces.means(values)).sum()) for values in (strength, height))
+    strength = np.maximum(np.fmin(raised.height, away), 0.0)
+    strong, high = (
+        float((slender * pieces.means(values)).sum()) for values in (strength, raised.height)
+    )
     return strong, strong / high if high else 0.0
 
 
@@ -250,16 +290,15 @@ def lined(mask: Mask, other: Mask) -> bool:
     return shares[0] > 0.5 and shares[0] > 1.2 * shares[1]
 
 
-def thresholded(height: Floats32, level: float) -> Mask:
+def thresholded(raised: Raised) -> Mask:
     """Return what stands out by half of its own strength, so that blur does not widen it."""
-    mask = (height > level).astype(np.uint8)
-    pieces = Pieces.of(mask)
+    mask, height, pieces = raised.mask, raised.height, raised.pieces
     if not len(pieces.areas):
         return mask
     values = height.ravel()[pieces.order]
     typical = ranked(pieces, height)[pieces.firsts + (3 * pieces.areas) // 4]
     strongest = cv2.dilate(height, np.ones((11, 11), np.uint8)).ravel()[pieces.order]
-    asked = np.clip(0.4 * strongest, level, 0.55 * np.repeat(typical, pieces.areas))
+    asked = np.clip(0.4 * strongest, raised.level, 0.55 * np.repeat(typical, pieces.areas))
     found = np.zeros(mask.size, np.uint8)
     found[pieces.order[values > asked]] = 1
     return found.reshape(mask.shape)
@@ -283,9 +322,10 @@ def insides(mask: Mask, widest: float) -> Mask:
     gaps = ((closed > 0) & (mask == 0)).astype(np.uint8)
     found = np.zeros(mask.size, np.uint8)
     pieces = Pieces.of(gaps)
-    if len(pieces.areas):
+    large = pieces.areas > LEAST_HOLLOW_AREA
+    if large.any():
         thickness = np.maximum(2.0 * pieces.deepest(gaps) - 1.0, 1.0)
-        long = (pieces.areas > 10.0 * thickness**2) & (pieces.areas > 20)
+        long = (pieces.areas > 10.0 * thickness**2) & large
         found[pieces.order[np.repeat(long, pieces.areas)]] = 1
     return found.reshape(mask.shape)
 

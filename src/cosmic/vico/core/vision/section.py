@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import erf
 
-from cosmic.vico.core.vision.grey import Floats, Floats32
+from cosmic.vico.core.vision.grey import Floats, Floats32, middle
 from cosmic.vico.core.vision.profiles import Flags, Scene
 from cosmic.vico.core.vision.smoothing import directions
 
@@ -135,7 +135,7 @@ def _summed(
     typical = _middle(mean, seen)
     # The scatter of few parts is itself uncertain; that of all bins is not.
     scatter = 1.4826 * _middle(np.abs(mean - typical), seen)
-    scatter = np.maximum(scatter, float(np.median(scatter)))
+    scatter = np.maximum(scatter, middle(scatter))
     point = np.bincount(at, away, size).reshape(shape)[:, full].sum(axis=0)
     return Samples(point / count.sum(axis=0), typical, 1.25 * scatter / math.sqrt(shape[0]))
 
@@ -271,8 +271,8 @@ def pooled(sections: list[Section]) -> list[Section]:
         return sections
     blurs = np.array([each.blur_ln for each in sections])
     stds = np.array([each.blur_ln_std for each in sections])
-    middle = float(np.median(blurs))
-    alike = np.abs(blurs - middle) <= np.maximum(3.0 * stds, 0.1)
+    typical = middle(blurs)
+    alike = np.abs(blurs - typical) <= np.maximum(3.0 * stds, 0.1)
     found = []
     for index, each in enumerate(sections):
         others = alike.copy()

@@ -1,11 +1,17 @@
 """A curve through uncertain points: as smooth as they allow, across gaps as well."""
 
+from functools import lru_cache
+
 import numpy as np
-from scipy.linalg import LinAlgError, solveh_banded
+import numpy.typing as npt
+from scipy.linalg.lapack import dpbsv
+from scipy.ndimage import correlate1d, median_filter, minimum_filter1d
 
 from cosmic.vico.core.vision.grey import Floats
 
 ORDER = 3
+KERNEL_DEVIATIONS = 4.0
+"""So far out a Gaussian kernel goes."""
 
 
 class UndeterminedError(Exception):
@@ -34,16 +40,44 @@ def smooth(values: Floats, weights: Floats, wave: float) -> Floats:
             product = strength * stencil[first] * stencil[last]
             bands[last - first, first : count - ORDER + first] += product
     bands[0] += weights + 1e-9
-    lower = np.zeros_like(bands)
-    for offset in range(ORDER + 1):
-        lower[offset, : count - offset] = bands[offset, : count - offset]
     right = values * (weights + 1e-9)[:, None]
-    try:
-        return np.asarray(solveh_banded(lower, right, lower=True, check_finite=False))
-    except LinAlgError as exc:
+    _, found, failed = dpbsv(bands, right, lower=True, overwrite_ab=True)
+    if failed:
         raise UndeterminedError(
             f"{np.count_nonzero(weights)} of {count} points count, for {wave:.0f} points a wave"
-        ) from exc
+        )
+    return np.asarray(found)
+
+
+def softened(values: Floats, sigma: float) -> Floats:
+    """Return values after a Gaussian filter along their last axis, the ends repeated outside."""
+    found = np.empty(values.shape)
+    correlate1d(values, _gaussian(sigma), output=found, mode="nearest")
+    return found
+
+
+@lru_cache(maxsize=64)
+def _gaussian(sigma: float) -> Floats:
+    """Return a Gaussian kernel, which nobody changes."""
+    reach = int(KERNEL_DEVIATIONS * sigma + 0.5)
+    kernel = np.exp(-0.5 / (sigma * sigma) * np.arange(-reach, reach + 1) ** 2)
+    kernel /= kernel.sum()
+    kernel.flags.writeable = False
+    return np.asarray(kernel)
+
+
+def levelled(values: Floats, size: int) -> Floats:
+    """Return the median of `size` values around each, the ends repeated outside."""
+    found = np.empty_like(values)
+    median_filter(values, size, output=found, mode="nearest")
+    return found
+
+
+def eroded(flags: npt.NDArray[np.bool_], reach: int) -> npt.NDArray[np.bool_]:
+    """Return where all flags up to `reach` away are set, and none of these lies outside."""
+    found = np.empty(flags.shape, np.uint8)
+    minimum_filter1d(flags.view(np.uint8), 2 * reach + 1, output=found, mode="constant", cval=0)
+    return found.view(np.bool_)
 
 
 def arc_lengths(line: Floats) -> Floats:
@@ -83,8 +117,11 @@ def _curve(s: Floats, line: Floats, at: Floats) -> Floats:
     width = gap[index]
     part = (at - s[index])[:, None] / width
     rest = 1.0 - part
-    first, last, mean_slope = line[index], line[index + 1], chord[index]
-    bend = rest * (slope[index] - mean_slope) - part * (slope[index + 1] - mean_slope)
+    after = index + 1
+    first, last = line.take(index, axis=0), line.take(after, axis=0)
+    mean_slope = chord.take(index, axis=0)
+    bend = rest * (slope.take(index, axis=0) - mean_slope)
+    bend -= part * (slope.take(after, axis=0) - mean_slope)
     return np.asarray(rest * first + part * last + part * rest * width * bend)
 
 

@@ -18,6 +18,7 @@ from cosmic.vico.core.vision.edges import (
     measure,
     turned,
 )
+from cosmic.vico.core.vision.grey import middle
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen, ToolEnd
 from cosmic.vico.hw.interface import Pixels
 
@@ -115,7 +116,7 @@ def _look(image: Pixels, expected: ExpectedTool) -> tuple[Frame, Levels, list[Bl
 
 
 def _pair(frame: Frame, found: list[Blob], expected: ExpectedTool) -> tuple[Blob, Blob] | NotSeen:
-    middle = 0.5 * (frame.pixels.shape[0] - 1)
+    centre = 0.5 * (frame.pixels.shape[0] - 1)
     half = 0.5 * (expected.gap_px + expected.width_px)
     if len(found) == 1:
         across = found[0].high - found[0].low
@@ -125,7 +126,7 @@ def _pair(frame: Frame, found: list[Blob], expected: ExpectedTool) -> tuple[Blob
     pairs = [(one, other) for i, one in enumerate(found) for other in found[i + 1 :]]
 
     def off(pair: tuple[Blob, Blob]) -> float:
-        at = [0.5 * (each.low + each.high) - middle for each in pair]
+        at = [0.5 * (each.low + each.high) - centre for each in pair]
         apart = abs(pair[0].front - pair[1].front)
         return float(abs(at[0] + half) + abs(at[1] - half) + 0.5 * apart)
 
@@ -260,5 +261,5 @@ def _true_width(
     front = int(min(first.front.offset, second.front.offset))
     strip = frame.pixels[low:high, max(0, front - 40) : max(1, front - 4)]
     # Filled from jaw to jaw, both look broader.
-    filled = strip.size == 0 or float(np.median(strip)) < greys.ground - FILLED * greys.contrast
+    filled = strip.size == 0 or middle(strip) < greys.ground - FILLED * greys.contrast
     return min(narrow, expected.width_px) if filled else narrow
