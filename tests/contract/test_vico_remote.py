@@ -1,5 +1,6 @@
 """ViCo is used in the same way at home and from another station, over either transport."""
 
+import shutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -476,6 +477,25 @@ def test_a_time_lapse_ends_where_no_image_came_until_after_its_end(tmp_path: Pat
         rig.home.camera.push(noise(6))
         lapse.wait(LIMIT_S)
         assert camera.recording.written == 0
+
+
+def test_a_time_lapse_that_failed_ends_no_recording_after_it(tmp_path: Path) -> None:
+    with vico_rig("home", tmp_path) as rig:
+        camera, pushed = rig.vico.camera(), rig.home.camera
+        lapse = camera.time_lapse(tmp_path / "lapse", "tiff", interval_s=1.0, count=3)
+        pushed.push(noise(1))
+        assert soon(lambda: camera.recording.written)
+        shutil.rmtree(tmp_path / "lapse")
+        assert soon(lambda: lapse.done and camera.recording.failure)
+        camera.record(tmp_path / "after", "tiff")
+        began_s = rig.home.application.clock.now_s()
+        assert soon(lambda: rig.home.application.clock.now_s() - began_s > 4.0)
+        for seed in range(5):
+            pushed.push(noise(seed))
+            assert soon(lambda count=seed + 1: camera.recording.written == count)
+        assert camera.recording.active
+        camera.stop_recording(wait=True)
+        rig.home.failures.clear()
 
 
 # --- lens and light ---------------------------------------------------------------------------
