@@ -436,3 +436,34 @@ def test_the_folder_of_a_session_goes_along_with_that_of_all(tmp_path: Path) -> 
     made = folder()
     assert made.is_dir()
     assert made.parent == tmp_path / "sessions"
+
+
+def item_names(panel: ResultsPanel) -> set[str]:
+    return {item.name for session in panel.sessions.sessions for item in session.items}
+
+
+def test_the_images_of_a_film_are_listed_once_as_a_film(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_images(tmp_path / "film", count=3)
+    panel.refresh()
+    qtbot.waitUntil(lambda: panel.sessions.row_of("film") is not None)
+    assert item_names(panel) == {"film"}
+
+
+def test_a_folder_that_cannot_be_read_hides_no_other(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a", "b", "c"):
+        write_force(tmp_path / name / f"{name}.h5", seconds=0.1)
+    plain = Path.stat
+
+    def stat(path: Path, **kwargs: bool) -> os.stat_result:
+        if path.parent == tmp_path / "b":
+            raise PermissionError(13, "Permission denied", str(path))
+        return plain(path, **kwargs)
+
+    monkeypatch.setattr(Path, "stat", stat)
+    panel.refresh()
+    qtbot.waitUntil(lambda: bool(panel.sessions.sessions))
+    assert item_names(panel) >= {"a", "c"}
