@@ -10,9 +10,11 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pyqtgraph as pg
 import pytest
+import tifffile
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
@@ -467,3 +469,35 @@ def test_a_folder_that_cannot_be_read_hides_no_other(
     panel.refresh()
     qtbot.waitUntil(lambda: bool(panel.sessions.sessions))
     assert item_names(panel) >= {"a", "c"}
+
+
+STILLS: dict[str, Any] = {
+    "colour16.png": np.full((64, 96, 3), 40_000, np.uint16),
+    "colour16.tif": np.full((64, 96, 3), 40_000, np.uint16),
+    "floats.tif": np.linspace(0.0, 1.0, 64 * 96, dtype=np.float32).reshape(64, 96),
+    "heights.tif": np.where(np.eye(64, 96) > 0, np.nan, np.arange(96.0)).astype(np.float32),
+    "signed.tif": np.arange(-3072, 3072, dtype=np.int16).reshape(64, 96),
+    "mask.tif": np.eye(64, 96) > 0,
+}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", STILLS)
+def test_an_image_of_another_program_is_shown_whatever_its_numbers(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path, name: str
+) -> None:
+    data = STILLS[name]
+    if name.endswith(".png"):
+        cv2.imwrite(str(tmp_path / name), data)
+    else:
+        tifffile.imwrite(tmp_path / name, data)
+    panel.refresh()
+    choose(panel, qtbot, Path(name).stem)
+    pictures = panel.viewer.pictures
+    qtbot.waitUntil(lambda: pictures.image is not None)
+    shown = pictures.view.grab().toImage()
+    middle = shown.pixelColor(shown.width() // 2, shown.height() // 2)
+    if name != "mask.tif":
+        assert middle.value() > 20
+    assert pictures.image is not None
+    assert pictures.image.data.shape[:2] == (64, 96)

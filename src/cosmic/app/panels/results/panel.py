@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from cosmic.app.panels.results.pictures import still_pixels
 from cosmic.app.panels.results.session_list import THUMBNAIL, SessionList
 from cosmic.app.panels.results.viewer import ResultViewer
 from cosmic.app.results.sessions import Item, ItemKind
@@ -306,7 +307,7 @@ def thumbnail_of(item: Item) -> QImage | None:
         if item.kind is ItemKind.IMAGE:
             from cosmic.vico.core.measuring.image_files import read_images
 
-            return _scaled(next(iter(read_images(item.path))).pixels)
+            return _scaled(still_pixels(next(iter(read_images(item.path))).pixels))
     except (CosmicError, OSError, IndexError, ValueError, StopIteration) as exc:
         logger.debug("%s has no thumbnail: %s", item.path, exc)
     return None
