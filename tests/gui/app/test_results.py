@@ -501,3 +501,19 @@ def test_an_image_of_another_program_is_shown_whatever_its_numbers(
         assert middle.value() > 20
     assert pictures.image is not None
     assert pictures.image.data.shape[:2] == (64, 96)
+
+
+def test_over_an_axis_that_turns_everything_is_in_degrees(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    file = write_force(tmp_path / "turn.h5", close=False)
+    for after_s in np.arange(0.0, 4.01, 0.05):
+        file.add_positions([AxisPosition(START_S + after_s, "table", 2.0 * after_s, unit="deg")])
+    file.close(complete=True)
+    panel.refresh()
+    choose(panel, qtbot, "turn")
+    viewer = panel.viewer
+    viewer.across.setCurrentText("table")
+    viewer.across.activated.emit(viewer.across.currentIndex())
+    assert "µN/°" in viewer.slope.text()
+    assert "µm" not in viewer.slope.text()
