@@ -517,3 +517,18 @@ def test_over_an_axis_that_turns_everything_is_in_degrees(
     viewer.across.activated.emit(viewer.across.currentIndex())
     assert "µN/°" in viewer.slope.text()
     assert "µm" not in viewer.slope.text()
+
+
+def test_an_export_replaces_no_file_whatever_the_recording_is_called(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "push 0.5 N [2].h5")
+    (tmp_path / "push 0.png").write_bytes(b"somebody's")
+    panel.refresh()
+    choose(panel, qtbot, "push 0.5")
+    for _ in range(2):
+        qtbot.mouseClick(panel.viewer.export, LEFT)
+    assert (tmp_path / "push 0.png").read_bytes() == b"somebody's"
+    for name in ("push 0.5 N [2]_seen", "push 0.5 N [2]_seen_2"):
+        assert (tmp_path / f"{name}.png").stat().st_size > 1000
+        assert (tmp_path / f"{name}_values.csv").exists()

@@ -203,16 +203,17 @@ class ResultsPanel(QWidget):
         if path is None:
             return
         base = free_base(path.parent, f"{path.stem}_seen")
+        picture = base.with_name(f"{base.name}.png")  # a name may have full stops of its own
         try:
-            if not self.viewer.grab().save(str(base.with_suffix(".png"))):
-                raise OSError(f"{base.with_suffix('.png')} cannot be written")
+            if not self.viewer.grab().save(str(picture)):
+                raise OSError(f"{picture} cannot be written")
             values = self.viewer.between_cursors()
             if values:
                 write_values(base.with_name(f"{base.name}_values.csv"), values, self.viewer)
         except OSError as exc:
             self.message.set_text(f"Not written: {exc}")
             return
-        self._written = base.with_suffix(".png")
+        self._written = picture
         also = f" and {base.name}_values.csv" if values else ""
         self.message.set_text(f"written: {self._written}{also}")
 
@@ -264,11 +265,12 @@ def open_with_desktop(path: Path) -> None:
 
 
 def free_base(folder: Path, base: str) -> Path:
-    """Return a path, without ending, of which no file is there yet."""
-    number = 1
-    while any(folder.glob(f"{base}{'' if number == 1 else f'_{number}'}*.png")):
+    """Return a path, without ending, of which no image and no table is there yet."""
+    number, name = 1, base
+    while any((folder / f"{name}{each}").exists() for each in (".png", "_values.csv")):
         number += 1
-    return folder / (base if number == 1 else f"{base}_{number}")
+        name = f"{base}_{number}"
+    return folder / name
 
 
 def write_values(
