@@ -532,3 +532,19 @@ def test_an_export_replaces_no_file_whatever_the_recording_is_called(
     for name in ("push 0.5 N [2]_seen", "push 0.5 N [2]_seen_2"):
         assert (tmp_path / f"{name}.png").stat().st_size > 1000
         assert (tmp_path / f"{name}_values.csv").exists()
+
+
+def test_what_was_chosen_last_is_shown_after_one_that_cannot_be(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    (tmp_path / "broken.h5").write_bytes(b"no recording")
+    write_force(tmp_path / "push.h5")
+    panel.refresh()
+    sessions = panel.sessions
+    qtbot.waitUntil(lambda: sessions.row_of("push") is not None)
+    for name in ("broken", "push"):
+        row = sessions.row_of(name)
+        assert row is not None
+        sessions.list.setCurrentItem(row)
+    qtbot.waitUntil(lambda: [t.path.stem for t in panel.viewer.timelines] == ["push"])
+    assert "cannot be shown" not in panel.message.text()

@@ -71,6 +71,7 @@ class ResultsPanel(QWidget):
         self.setObjectName("resultsPanel")
         self._jobs = BackgroundJobs("results", policy)
         self._asked: tuple[Item, ...] = ()
+        self._being_read: tuple[Item, ...] = ()
         self._loading = False
         self._state = (0, 0)
         self._loaded = Relay(self._on_loaded)
@@ -146,36 +147,31 @@ class ResultsPanel(QWidget):
     def _load(self) -> None:
         """Have what is chosen read; while something is read, only the newest choice waits."""
         asked = self._asked
-        if self._loading:
+        if self._loading or (asked and asked[0].kind is ItemKind.CAMPAIGN):
             return
         if not asked:
             self.viewer.show_timelines(())
             return
         self._loading = True
+        self._being_read = asked
         self._state = _state_of(asked[0])
         beside = [each for session in self.sessions.sessions for each in session.items]
 
-        def load() -> tuple[tuple[Item, ...], list[Timeline]]:
+        def load() -> list[Timeline]:
             first = load_timeline(asked[0], beside)
-            return asked, [first, *(load_timeline(each) for each in asked[1:])]
+            return [first, *(load_timeline(each) for each in asked[1:])]
 
         self._jobs.do(load, self._loaded)
 
-    def _on_loaded(
-        self,
-        found: tuple[tuple[Item, ...], list[Timeline]] | None,
-        error: CosmicError | None,
-    ) -> None:
+    def _on_loaded(self, timelines: list[Timeline] | None, error: CosmicError | None) -> None:
         self._loading = False
-        if found is None:
-            self.viewer.show_timelines(())
-            self.message.set_text(f"It cannot be shown: {error}")
-            return
-        asked, timelines = found
-        if asked == self._asked:
+        if self._being_read != self._asked:  # others were chosen meanwhile
+            self._load()
+        elif timelines is not None:
             self.viewer.show_timelines(timelines)
         else:
-            self._load()
+            self.viewer.show_timelines(())
+            self.message.set_text(f"It cannot be shown: {error}")
 
     def _on_follow(self) -> None:
         """Show what was added to a recording that is still written."""
