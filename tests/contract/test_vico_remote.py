@@ -1,16 +1,19 @@
 """ViCo is used in the same way at home and from another station, over either transport."""
 
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from threading import Event
 from typing import Any
 
 import numpy as np
 import pytest
+import tifffile
 
 from contract.station_rig import connected, free_port, listening
 from contract.vico_rig import (
@@ -452,8 +455,16 @@ def test_images_and_time_lapses_are_written(rig: VicoRig, tmp_path: Path) -> Non
     camera = rig.vico.camera()
     rig.home.camera.push(noise(5))
     assert soon(lambda: camera.latest() is not None)
+    taken = datetime.now(UTC)
+    camera.stop().wait(LIMIT_S)
+    assert soon(lambda: (datetime.now(UTC) - taken).total_seconds() > 2.5)
     camera.snap(tmp_path / "one.tif").wait(LIMIT_S)
-    assert (tmp_path / "one.tif").exists()
+    camera.start().wait(LIMIT_S)
+    with tifffile.TiffFile(tmp_path / "one.tif") as file:
+        found = re.search(r"AcquisitionDate>([^<]+)<", file.ome_metadata or "")
+    assert found is not None
+    said = datetime.fromisoformat(found[1])
+    assert abs((said - taken).total_seconds()) < 1.5  # of the image, not of the snap
     with pytest.raises(RecordingExistsError):
         camera.snap(tmp_path / "one.tif").wait(LIMIT_S)
     # Half a second of the wall: a busy computer that is later than that has missed a picture.
