@@ -99,7 +99,7 @@ def test_a_board_that_does_not_answer_is_named(qtbot, panel, port):
     assert panel.rows["piezo"].shown.text() == "■ no answer"
 
 
-def test_a_stop_that_was_reset_elsewhere_is_not_told_of_any_more(qtbot, panel, port):
+def test_a_stop_that_another_window_reset_is_not_shown_any_more(qtbot, panel, port):
     port.change(outputs_stopped="STOP button")
     qtbot.waitUntil(lambda: "STOP button" in panel.refusal.text())
     port.change(outputs_stopped="")

@@ -188,7 +188,7 @@ def test_poses_are_taught_gone_to_and_offered_to_recordings(
     assert mico.poses.names == []
 
 
-def test_what_was_rehearsed_is_not_told_of_another_trajectory(
+def test_a_rehearsal_is_shown_with_its_own_trajectory_only(
     panel: TrajectoryPanel, mico: Mico, qtbot: QtBot, tmp_path: Path
 ) -> None:
     opened(panel, qtbot, tmp_path, HEAD + "left.x by 5 um\nleft.x by -5 um\n")

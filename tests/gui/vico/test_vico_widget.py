@@ -34,7 +34,7 @@ def test_cameras_and_lens_become_docks_of_the_window(own, tmp_path, theme):
     assert gui.lens.camera.isVisibleTo(gui.lens)  # which camera is to become sharp
 
 
-def test_two_cameras_of_one_title_are_told_apart(own):
+def test_two_cameras_of_one_title_have_different_panels(own):
     cameras = tuple(CameraConfig(name=name, title="Microscope") for name in ("top", "side"))
     application = VicoApplication(
         lambda _: None,
