@@ -1,15 +1,19 @@
 """ViCo is used in the same way at home and from another station, over either transport."""
 
+import re
+import shutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from threading import Event
 from typing import Any
 
 import numpy as np
 import pytest
+import tifffile
 
 from contract.station_rig import connected, free_port, listening
 from contract.vico_rig import (
@@ -451,8 +455,16 @@ def test_images_and_time_lapses_are_written(rig: VicoRig, tmp_path: Path) -> Non
     camera = rig.vico.camera()
     rig.home.camera.push(noise(5))
     assert soon(lambda: camera.latest() is not None)
+    taken = datetime.now(UTC)
+    camera.stop().wait(LIMIT_S)
+    assert soon(lambda: (datetime.now(UTC) - taken).total_seconds() > 2.5)
     camera.snap(tmp_path / "one.tif").wait(LIMIT_S)
-    assert (tmp_path / "one.tif").exists()
+    camera.start().wait(LIMIT_S)
+    with tifffile.TiffFile(tmp_path / "one.tif") as file:
+        found = re.search(r"AcquisitionDate>([^<]+)<", file.ome_metadata or "")
+    assert found is not None
+    said = datetime.fromisoformat(found[1])
+    assert abs((said - taken).total_seconds()) < 1.5  # of the image, not of the snap
     with pytest.raises(RecordingExistsError):
         camera.snap(tmp_path / "one.tif").wait(LIMIT_S)
     # Half a second of the wall: a busy computer that is later than that has missed a picture.
@@ -476,6 +488,25 @@ def test_a_time_lapse_ends_where_no_image_came_until_after_its_end(tmp_path: Pat
         rig.home.camera.push(noise(6))
         lapse.wait(LIMIT_S)
         assert camera.recording.written == 0
+
+
+def test_a_time_lapse_that_failed_ends_no_recording_after_it(tmp_path: Path) -> None:
+    with vico_rig("home", tmp_path) as rig:
+        camera, pushed = rig.vico.camera(), rig.home.camera
+        lapse = camera.time_lapse(tmp_path / "lapse", "tiff", interval_s=1.0, count=3)
+        pushed.push(noise(1))
+        assert soon(lambda: camera.recording.written)
+        shutil.rmtree(tmp_path / "lapse")
+        assert soon(lambda: lapse.done and camera.recording.failure)
+        camera.record(tmp_path / "after", "tiff")
+        began_s = rig.home.application.clock.now_s()
+        assert soon(lambda: rig.home.application.clock.now_s() - began_s > 4.0)
+        for seed in range(5):
+            pushed.push(noise(seed))
+            assert soon(lambda count=seed + 1: camera.recording.written == count)
+        assert camera.recording.active
+        camera.stop_recording(wait=True)
+        rig.home.failures.clear()
 
 
 # --- lens and light ---------------------------------------------------------------------------

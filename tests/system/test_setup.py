@@ -103,6 +103,50 @@ def test_entries_are_written_and_comments_kept(folder: Path) -> None:
     assert main(["setup", "--config", str(folder)]) == 0
 
 
+LINE = """\
+[platform]
+name = "New"
+applications = ["mico"]
+"""
+
+
+LEFT_X = (
+    'name = "left.x"',
+    "device = 0",
+    "channel = 0",
+    'kind = "linear"',
+    "limits_um = [-55.0, 55.0]",
+)
+
+
+@pytest.mark.parametrize(
+    "mico",
+    [
+        'mico = { backend = "simulated", positioner = [] }\n',
+        '[mico]\nbackend = "simulated"\npositioner = []\n',
+        f'[mico]\nbackend = "simulated"\npositioner = [{{ {", ".join(LEFT_X)} }}]\n',
+        '[mico]\nbackend = "simulated"\n[vico]\n[[mico.positioner]]\n' + "\n".join(LEFT_X),
+    ],
+)
+def test_a_platform_file_is_added_to_however_it_is_written(folder: Path, mico: str) -> None:
+    text = mico + LINE if mico.startswith("mico =") else LINE + mico
+    (folder / "platform.toml").write_text(text, encoding="utf-8")
+    (folder / ".#platform.toml").symlink_to("operator@here.1234")
+    assert main(["setup", "--config", str(folder), "--write"]) == 0
+    with cosmic.connect(folder, applications=("mico",), rate=20) as rig:
+        assert len(rig.mico.names) == 9
+    assert main(["setup", "--config", str(folder)]) == 0
+
+
+def test_the_drives_of_a_scene_may_be_written_in_a_line(folder: Path) -> None:
+    line = 'urdf = "scene.urdf"\nsrdf = "scene.srdf"\nmargin_um = 20.0\n'
+    drive = 'drive = [{ axis = "left.x", joint = "x", overshoot_um = 2.0 }]\n'
+    (folder / "scene.toml").write_text(line + drive, encoding="utf-8")
+    assert main(["setup", "--config", str(folder), "--write"]) == 0
+    assert main(["check", str(folder)]) == 0
+    assert "overshoot_um = 2.0" in (folder / "scene.toml").read_text(encoding="utf-8")
+
+
 def test_the_configuration_that_ships_is_not_changed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["setup", "--write"]) == 1
     assert "cosmic init" in capsys.readouterr().err

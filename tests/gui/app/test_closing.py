@@ -7,9 +7,9 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.windows.closing import CloseDialog
+from cosmic.app.windows.closing import CloseDialog, ParkDialog
 from cosmic.app.windows.operator_window import OperatorWindow
-from gui.app.windows import Make
+from gui.app.windows import Make, mico
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -49,6 +49,29 @@ def test_closing_asks_while_a_recording_is_written(recording: OperatorWindow, qt
     again = question(recording)
     assert again is not None
     qtbot.mouseClick(again.now, LEFT)
+    assert not recording.isVisible()
+
+
+def test_what_is_lost_is_asked_again_after_a_close_that_was_cancelled_at_the_second_question(
+    recording: OperatorWindow, qtbot: QtBot
+) -> None:
+    qtbot.waitUntil(lambda: mico(recording).mico.ready, timeout=15_000)
+    mico(recording).mico.poses.teach("park", ["left.x"])
+    recording.close()
+    first = question(recording)
+    assert first is not None
+    qtbot.mouseClick(first.now, LEFT)
+    qtbot.waitUntil(lambda: isinstance(question(recording), ParkDialog))
+    parking = question(recording)
+    assert parking is not None
+    qtbot.mouseClick(parking.cancel, LEFT)
+    qtbot.waitUntil(lambda: question(recording) is None)
+    assert recording.isVisible()
+    recording.close()
+    again = question(recording)
+    assert again is not None
+    assert "first.h5" in again.informativeText()
+    recording.close_now()
     assert not recording.isVisible()
 
 

@@ -137,6 +137,19 @@ def test_a_calculated_channel_is_drawn_beside_the_force_and_kept_for_the_next_st
     assert stored.value("force/calculated") == "10 + 0 * force"
 
 
+def test_a_formula_of_a_channel_that_is_not_there_is_kept_for_a_later_start(
+    make: Make, stored: QSettings
+) -> None:
+    stored.setValue("force/calculated", "force - 2 * absent")
+    window = make(applications=("mico", "daqco", "vico"), hardware=False)
+    assert window.tasks is not None
+    force = window.tasks.force
+    assert force is not None
+    assert "no channel absent" in force.message.text()
+    window.close()
+    assert stored.value("force/calculated") == "force - 2 * absent"
+
+
 def test_the_menu_of_the_force_does_what_it_says(
     make: Make, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,9 +10,11 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pyqtgraph as pg
 import pytest
+import tifffile
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
@@ -436,3 +438,113 @@ def test_the_folder_of_a_session_goes_along_with_that_of_all(tmp_path: Path) -> 
     made = folder()
     assert made.is_dir()
     assert made.parent == tmp_path / "sessions"
+
+
+def item_names(panel: ResultsPanel) -> set[str]:
+    return {item.name for session in panel.sessions.sessions for item in session.items}
+
+
+def test_the_images_of_a_film_are_listed_once_as_a_film(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_images(tmp_path / "film", count=3)
+    panel.refresh()
+    qtbot.waitUntil(lambda: panel.sessions.row_of("film") is not None)
+    assert item_names(panel) == {"film"}
+
+
+def test_a_folder_that_cannot_be_read_hides_no_other(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a", "b", "c"):
+        write_force(tmp_path / name / f"{name}.h5", seconds=0.1)
+    plain = Path.stat
+
+    def stat(path: Path, **kwargs: bool) -> os.stat_result:
+        if path.parent == tmp_path / "b":
+            raise PermissionError(13, "Permission denied", str(path))
+        return plain(path, **kwargs)
+
+    monkeypatch.setattr(Path, "stat", stat)
+    panel.refresh()
+    qtbot.waitUntil(lambda: bool(panel.sessions.sessions))
+    assert item_names(panel) >= {"a", "c"}
+
+
+STILLS: dict[str, Any] = {
+    "colour16.png": np.full((64, 96, 3), 40_000, np.uint16),
+    "colour16.tif": np.full((64, 96, 3), 40_000, np.uint16),
+    "floats.tif": np.linspace(0.0, 1.0, 64 * 96, dtype=np.float32).reshape(64, 96),
+    "heights.tif": np.where(np.eye(64, 96) > 0, np.nan, np.arange(96.0)).astype(np.float32),
+    "signed.tif": np.arange(-3072, 3072, dtype=np.int16).reshape(64, 96),
+    "mask.tif": np.eye(64, 96) > 0,
+}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", STILLS)
+def test_an_image_of_another_program_is_shown_whatever_its_numbers(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path, name: str
+) -> None:
+    data = STILLS[name]
+    if name.endswith(".png"):
+        cv2.imwrite(str(tmp_path / name), data)
+    else:
+        tifffile.imwrite(tmp_path / name, data)
+    panel.refresh()
+    choose(panel, qtbot, Path(name).stem)
+    pictures = panel.viewer.pictures
+    qtbot.waitUntil(lambda: pictures.image is not None)
+    shown = pictures.view.grab().toImage()
+    middle = shown.pixelColor(shown.width() // 2, shown.height() // 2)
+    if name != "mask.tif":
+        assert middle.value() > 20
+    assert pictures.image is not None
+    assert pictures.image.data.shape[:2] == (64, 96)
+
+
+def test_over_an_axis_that_turns_everything_is_in_degrees(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    file = write_force(tmp_path / "turn.h5", close=False)
+    for after_s in np.arange(0.0, 4.01, 0.05):
+        file.add_positions([AxisPosition(START_S + after_s, "table", 2.0 * after_s, unit="deg")])
+    file.close(complete=True)
+    panel.refresh()
+    choose(panel, qtbot, "turn")
+    viewer = panel.viewer
+    viewer.across.setCurrentText("table")
+    viewer.across.activated.emit(viewer.across.currentIndex())
+    assert "µN/°" in viewer.slope.text()
+    assert "µm" not in viewer.slope.text()
+
+
+def test_an_export_replaces_no_file_whatever_the_recording_is_called(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "push 0.5 N [2].h5")
+    (tmp_path / "push 0.png").write_bytes(b"somebody's")
+    panel.refresh()
+    choose(panel, qtbot, "push 0.5")
+    for _ in range(2):
+        qtbot.mouseClick(panel.viewer.export, LEFT)
+    assert (tmp_path / "push 0.png").read_bytes() == b"somebody's"
+    for name in ("push 0.5 N [2]_seen", "push 0.5 N [2]_seen_2"):
+        assert (tmp_path / f"{name}.png").stat().st_size > 1000
+        assert (tmp_path / f"{name}_values.csv").exists()
+
+
+def test_what_was_chosen_last_is_shown_after_one_that_cannot_be(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    (tmp_path / "broken.h5").write_bytes(b"no recording")
+    write_force(tmp_path / "push.h5")
+    panel.refresh()
+    sessions = panel.sessions
+    qtbot.waitUntil(lambda: sessions.row_of("push") is not None)
+    for name in ("broken", "push"):
+        row = sessions.row_of(name)
+        assert row is not None
+        sessions.list.setCurrentItem(row)
+    qtbot.waitUntil(lambda: [t.path.stem for t in panel.viewer.timelines] == ["push"])
+    assert "cannot be shown" not in panel.message.text()

@@ -97,3 +97,11 @@ def test_a_board_that_does_not_answer_is_named(qtbot, panel, port):
     port.change(outputs=(replace(PIEZO, value=None, problem="Dev1: the board is gone"), LAMP))
     qtbot.waitUntil(lambda: "the board is gone" in panel.refusal.text())
     assert panel.rows["piezo"].shown.text() == "■ no answer"
+
+
+def test_a_stop_that_another_window_reset_is_not_shown_any_more(qtbot, panel, port):
+    port.change(outputs_stopped="STOP button")
+    qtbot.waitUntil(lambda: "STOP button" in panel.refusal.text())
+    port.change(outputs_stopped="")
+    qtbot.waitUntil(lambda: panel.state.text() == "OUTPUTS")
+    assert panel.refusal.text() == ""

@@ -186,3 +186,19 @@ def test_poses_are_taught_gone_to_and_offered_to_recordings(
     assert at(panel, mico, "left.x") == pytest.approx(before, abs=1.0)
     click(qtbot, box, "removePose")
     assert mico.poses.names == []
+
+
+def test_a_rehearsal_is_shown_with_its_own_trajectory_only(
+    panel: TrajectoryPanel, mico: Mico, qtbot: QtBot, tmp_path: Path
+) -> None:
+    opened(panel, qtbot, tmp_path, HEAD + "left.x by 5 um\nleft.x by -5 um\n")
+    qtbot.waitUntil(panel.mirror_button.isEnabled)
+    drawn: list[object] = []
+    panel.preview_changed.connect(drawn.append)
+    panel.rehearse()
+    panel.mirror()
+    task = mico.application.running_task
+    qtbot.waitUntil(lambda: task is None or task.done)
+    qtbot.wait(200)
+    assert "Rehearse it to see what it does" in panel.report.text()
+    assert drawn == [None]

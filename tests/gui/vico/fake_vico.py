@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.operation import Operation, Task
 from cosmic.vico.api.coordinate_transform import CalibrationShown
@@ -134,6 +135,7 @@ class FakeCamera:
     def __init__(self, port: "FakeVico", name: str, directory: Path) -> None:
         self._port, self.name, self.directory = port, name, directory
         self.remote = self.refused = ""
+        self.clock = WALL
         self.info: CameraInfo | None = INFO
         self.ranges: CameraRanges | None = RANGES
         self.settings: CameraSettings | None = SETTINGS

@@ -1,5 +1,9 @@
 """The fibres of the live image are opened for correction, and kept beside the image."""
 
+from pathlib import Path
+
+from PySide6.QtCore import QStandardPaths
+
 from cosmic.vico.api.measure import Corrections, read_images, side_file
 
 
@@ -32,3 +36,19 @@ def test_why_no_fibres_can_be_corrected_is_said_over_the_image(qtbot, view, came
     view.correct.click()
     qtbot.waitUntil(lambda: "cannot be looked for" in view.message.text)
     assert view.correct.editor is None and view.correct.isEnabled()
+
+
+def test_corrections_on_the_image_of_a_station_are_kept_on_this_computer(
+    qtbot, shown, camera, own, tmp_path, monkeypatch
+) -> None:
+    camera.remote, camera.directory = "fibres", Path("/no/such/folder/here")
+    here = tmp_path / "documents"
+    here.mkdir()
+    monkeypatch.setattr(QStandardPaths, "writableLocation", lambda _: str(here))
+    shown.correct.click()
+    qtbot.waitUntil(lambda: shown.correct.editor is not None)
+    editor = shown.correct.editor
+    own(editor)
+    editor.save.click()
+    (file,) = here.glob("fibres-*.tif")
+    assert str(side_file(file)) in editor.note.text()

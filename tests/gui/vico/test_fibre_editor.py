@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtWidgets import QMessageBox
 from pytestqt.qtbot import QtBot
 
 from cosmic.frame.errors import RecordingError
@@ -109,3 +110,53 @@ def test_what_lies_outside_the_image_is_refused_and_costs_no_click(qtbot: QtBot)
     qtbot.mouseRelease(pane, LEFT, pos=at(editor, 300.0, -3.0))
     assert "outside the image" in editor.note.text()
     assert lengths(editor) == pytest.approx([200, 300], abs=4)
+
+
+def cut(qtbot: QtBot, editor: FibreEditor) -> None:
+    choose(qtbot, editor, "cut")
+    click(qtbot, editor, 160.0, 100.0)
+    assert len(lengths(editor)) == 2
+
+
+def answer(qtbot: QtBot, editor: FibreEditor, button: QMessageBox.StandardButton) -> None:
+    assert editor.question is not None
+    qtbot.mouseClick(editor.question.button(button), LEFT)
+    qtbot.waitUntil(lambda: editor.question is None)
+
+
+def test_corrections_that_are_not_saved_are_not_lost_by_closing(qtbot: QtBot) -> None:
+    saved: list[str] = []
+    editor = make(qtbot, lambda: saved.append("kept") or "kept")
+    cut(qtbot, editor)
+    editor.close()
+    assert editor.isVisible()
+    answer(qtbot, editor, QMessageBox.StandardButton.Cancel)
+    assert editor.isVisible()
+    assert not saved
+    editor.close()
+    answer(qtbot, editor, QMessageBox.StandardButton.Save)
+    assert saved == ["kept"]
+    assert not editor.isVisible()
+
+
+def test_an_editor_that_cannot_save_stays_until_the_corrections_are_discarded(
+    qtbot: QtBot,
+) -> None:
+    def full() -> str:
+        raise RecordingError("the disk is full")
+
+    editor = make(qtbot, full)
+    cut(qtbot, editor)
+    editor.close()
+    answer(qtbot, editor, QMessageBox.StandardButton.Save)
+    assert editor.isVisible()
+    assert "the disk is full" in editor.note.text()
+    editor.close()
+    answer(qtbot, editor, QMessageBox.StandardButton.Discard)
+    assert not editor.isVisible()
+
+
+def test_an_editor_without_edits_closes_at_once(qtbot: QtBot) -> None:
+    editor = make(qtbot)
+    editor.close()
+    assert not editor.isVisible()

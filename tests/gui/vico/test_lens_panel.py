@@ -5,8 +5,11 @@ from dataclasses import replace
 import pytest
 from PySide6.QtCore import Qt
 
+from contract import vico_rig
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.theme import State
+from cosmic.vico.api.vico import Vico
+from cosmic.vico.core.settings import MotorLensSettings
 from cosmic.vico.gui.lens_panel import LensPanel
 from cosmic.vico.hw.peripherals import LensAxis
 
@@ -129,3 +132,19 @@ def test_a_lens_that_is_lost_says_so(qtbot, panel, lens):
     qtbot.waitUntil(lambda: panel.badge.state is State.ERROR)
     assert panel.name.text() == "no answer on /dev/ttyUSB0"
     assert not panel.home.isEnabled()
+
+
+def test_a_lens_without_a_table_of_magnifications_can_be_focused(own, qtbot, tmp_path, monkeypatch):
+    bare = MotorLensSettings(backend="simulated", homed=True)
+    made = vico_rig.settings(tmp_path).model_copy(update={"lens": bare})
+    monkeypatch.setattr(vico_rig, "settings", lambda _: made)
+    with vico_rig.used_locally(tmp_path) as home:
+        panel = LensPanel(Vico(home.application))
+        own(panel)
+        panel.show()
+        assert not panel.zoom.isEnabled()
+        assert "no zoom position has a magnification" in panel.zoom.toolTip()
+        qtbot.waitUntil(panel.focus.isEnabled)
+        enter(qtbot, panel.focus.field, "700")
+        thread = home.application.peripherals
+        qtbot.waitUntil(lambda: thread.state.focus.position_counts == 700)

@@ -4,9 +4,13 @@ import pytest
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QScrollArea, QSlider
 
+from cosmic.frame.clock import WALL
+from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.theme import apply_theme
-from cosmic.vico.gui.vico_gui import VicoGui, VicoWidget
+from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.core.settings import CameraConfig, VicoSettings
+from cosmic.vico.gui.vico_gui import VicoGui, VicoWidget, make_vico_gui
 from gui.vico.fake_vico import FakeVico, Found, Seen, fibre_image
 
 
@@ -28,6 +32,23 @@ def test_cameras_and_lens_become_docks_of_the_window(own, tmp_path, theme):
         view.look()
         assert view.view.image is images[name]
     assert gui.lens.camera.isVisibleTo(gui.lens)  # which camera is to become sharp
+
+
+def test_two_cameras_of_one_title_have_different_panels(own):
+    cameras = tuple(CameraConfig(name=name, title="Microscope") for name in ("top", "side"))
+    application = VicoApplication(
+        lambda _: None,
+        lambda: None,
+        lambda: None,
+        VicoSettings(camera=cameras),
+        clock=WALL,
+        policy=FailurePolicy(),
+    )
+    gui = make_vico_gui(application)
+    for widget in (*gui.cameras.values(), gui.lens):
+        own(widget)
+    titles = [view.windowTitle() for view in gui.cameras.values()]
+    assert titles == ["Microscope (top)", "Microscope (side)"]
 
 
 @pytest.mark.parametrize("size", [(900, 700), (560, 400), None])

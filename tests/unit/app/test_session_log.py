@@ -59,3 +59,14 @@ def test_a_folder_that_cannot_be_written_costs_one_line_in_the_log(tmp_path: Pat
     ring.handle(record("goes on"))
     log.close()
     assert [each.message for each in ring.records()] == ["goes on"]
+
+
+def test_a_line_with_the_name_of_a_file_that_is_no_text_is_kept(tmp_path: Path) -> None:
+    ring, begun = RingBufferHandler(), datetime.now(UTC)
+    log = SessionLog(ring, ManualClock())
+    ring.handle(record("recorded to fibre\udcff.h5"))
+    log.begin(tmp_path)
+    ring.handle(record("recorded to other\udcff.h5"))
+    log.close()
+    lines = [each.text for each in log_lines(tmp_path, 0.0, 1.0, begun)]
+    assert lines == [r"recorded to fibre\udcff.h5", r"recorded to other\udcff.h5"]

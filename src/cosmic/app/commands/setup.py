@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 import tomlkit
-from tomlkit.items import AoT
+from tomlkit.items import AoT, InlineTable, Table
 
 from cosmic.app.configuration.platform_file import load_platform
 from cosmic.app.connect import connect
@@ -112,9 +112,10 @@ def _looked_at(path: Path, found: Sequence[FoundAxis], *, move: bool) -> Iterato
     """Read where the axes stand, and move those that the operator agrees to; yield each."""
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "platform"
-        shutil.copytree(path.parent, copy)
+        # An editor's lock file is a link to nothing.
+        shutil.copytree(path.parent, copy, ignore_dangling_symlinks=True)
         file = copy / path.name
-        document = tomlkit.parse(file.read_text(encoding="utf-8"))
+        document = _parsed(file)
         document["platform"]["scene"] = ""
         _append(document, [replace(each, position=0.0) for each in found], room=_FAR)
         file.write_text(tomlkit.dumps(document), encoding="utf-8")
@@ -167,7 +168,7 @@ def new_texts(
     A body that nobody has measured stands half a metre away, where it touches nothing: put it where
     it is before the limits are widened.
     """
-    document = tomlkit.parse(path.read_text(encoding="utf-8"))
+    document = _parsed(path)
     _append(document, found)
     mico = document["mico"]
     if not mico.get("serials") and not mico.get("controller"):
@@ -176,14 +177,13 @@ def new_texts(
     if not scene:
         return tomlkit.dumps(document), (path, ""), (path, "")
     scene_path = path.parent / scene
-    drives = tomlkit.parse(scene_path.read_text(encoding="utf-8"))
-    listed = drives["drive"]
+    drives = _parsed(scene_path)
+    listed = _tables(drives, "drive")
     for each in found:
         drive = tomlkit.table()
         drive["axis"] = each.name
         drive["joint"] = _joint(each)
-        if isinstance(listed, AoT):
-            listed.append(drive)
+        listed.append(drive)
     urdf = scene_path.parent / str(drives["urdf"])
     model = urdf.read_text(encoding="utf-8")
     root = _root_link(model)
@@ -198,11 +198,11 @@ def new_texts(
 def _append(
     document: tomlkit.TOMLDocument, found: Sequence[FoundAxis], room: float | None = None
 ) -> None:
-    mico = document["mico"]
-    listed = mico.get("positioner")
-    if listed is None:
-        listed = tomlkit.aot()
-        mico["positioner"] = listed
+    if isinstance(document["mico"], InlineTable):
+        there = document.pop("mico")
+        document["mico"] = tomlkit.table()
+        document["mico"].update(there)
+    listed = _tables(document["mico"], "positioner")
     for each in found:
         entry = tomlkit.table()
         entry["name"] = each.name
@@ -214,6 +214,27 @@ def _append(
         limits.comment(_GUESS)
         entry[f"limits_{each.unit}"] = limits
         listed.append(entry)
+
+
+def _parsed(path: Path) -> tomlkit.TOMLDocument:
+    text = path.read_text(encoding="utf-8")
+    # What is added to a last line without an end would stand in it.
+    return tomlkit.parse(text if text.endswith("\n") else f"{text}\n")
+
+
+def _tables(holder: tomlkit.TOMLDocument | Table, key: str) -> AoT:
+    """Return a list of sections to which one can be added; one in a line is rewritten."""
+    listed = holder.get(key)
+    if isinstance(listed, AoT):
+        return listed
+    holder.pop(key, None)
+    made = tomlkit.aot()
+    for each in listed or ():
+        section = tomlkit.table()
+        section.update(each)
+        made.append(section)
+    holder[key] = made
+    return made
 
 
 def _joint(axis: FoundAxis) -> str:

@@ -68,7 +68,8 @@ class SessionLog:
             try:
                 path = folder / NAME
                 fresh = not path.exists()
-                self._file = path.open("a", encoding="utf-8", newline="")
+                # A name of a file may hold bytes that are no text.
+                self._file = path.open("a", encoding="utf-8", errors="backslashreplace", newline="")
                 if fresh:
                     self._file.write("\t".join(HEAD) + "\n")
                 for record in self._ring.records():

@@ -155,12 +155,30 @@ def sessions_in(folders: Sequence[Path]) -> list[Session]:
 
 
 def _items(folder: Path) -> Iterator[Item]:
+    yield from _readable_items_of(folder)
     try:
-        inner = [each for each in folder.iterdir() if each.is_dir()]
+        there = sorted(folder.iterdir())
+    except OSError:
+        return
+    for each in there:
+        try:
+            # Recordings of a campaign belong to its report, and images of a film to that.
+            listed = each.is_dir() and not (each / DATABASE).exists() and not _is_film(each)
+        except OSError as exc:
+            logger.debug("%s cannot be listed: %s", each, exc)
+            continue
+        if listed:
+            yield from _readable_items_of(each)
+
+
+def _is_film(folder: Path) -> bool:
+    return is_side_file(folder.with_name(folder.name + SIDE_SUFFIX))
+
+
+def _readable_items_of(folder: Path) -> Iterator[Item]:
+    """Yield what can be seen in a folder; one that cannot be read hides no other."""
+    try:
         yield from _items_of(folder)
-        for each in inner:
-            if not (each / DATABASE).exists():  # a campaign's own recordings belong to its report
-                yield from _items_of(each)
     except OSError as exc:
         logger.debug("%s cannot be listed: %s", folder, exc)
 

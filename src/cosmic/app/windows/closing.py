@@ -84,12 +84,20 @@ class ParkDialog(CloseDialog):
 
 
 class _Asking(QObject):
-    """Asks once for each attempt to close, where there is something to ask; GUI thread."""
+    """Asks once for each attempt to close, where there is something to ask; GUI thread.
+
+    Signals
+    -------
+    given_up()
+        The window is not to close after all: what was answered before counts no more.
+    """
+
+    given_up = Signal()
 
     def __init__(self, window: QWidget) -> None:
         super().__init__(window)
         self._window = window
-        self._answered = False
+        self._answered = self._skipped = False
         self.dialog: CloseDialog | None = None
 
     @abstractmethod
@@ -105,6 +113,7 @@ class _Asking(QObject):
         if dialog is None:
             return False
         dialog.now.clicked.connect(self._close)
+        dialog.rejected.connect(self.given_up)
         dialog.destroyed.connect(self._on_gone)
         self.dialog = dialog
         dialog.show()
@@ -112,10 +121,14 @@ class _Asking(QObject):
 
     def skip(self) -> None:
         """Ask nothing from now on: whoever closes the window cannot answer."""
-        self._answered = True
+        self._answered = self._skipped = True
         if self.dialog is not None:
             self.dialog.close()
             self.dialog = None
+
+    def forget(self) -> None:
+        """Ask again at the next attempt to close."""
+        self._answered = self._skipped
 
     def _on_gone(self) -> None:
         self.dialog = None
@@ -199,7 +212,7 @@ class Parking(_Asking):
         try:
             task = self._gui.mico.poses.go(PARK, wait=False)
         except CosmicError as exc:
-            self.failed.emit(str(exc))
+            self._fail(str(exc))
             return
         task.subscribe(self._relay)
 
@@ -207,6 +220,10 @@ class Parking(_Asking):
         if not progress.done:
             return
         if progress.error:
-            self.failed.emit(progress.error)
+            self._fail(progress.error)
         else:
             self._close()
+
+    def _fail(self, why: str) -> None:
+        self.failed.emit(why)
+        self.given_up.emit()

@@ -169,6 +169,9 @@ class OperatorWindow(CosmicServerGui):
         gui.undo_planned.connect(self._scene.set_planned)
         self._parking = Parking(gui, self._is_moving, self)
         self._parking.failed.connect(lambda why: self.top_bar.set_message(f"not parked: {why}"))
+        for asking in (self._closing, self._parking):
+            asking.given_up.connect(self._closing.forget)
+            asking.given_up.connect(self._parking.forget)
         self._collision_bar = CollisionBar(self.top_bar, gui, self)
         preview = PathPreview()
         self._scene.set_bar(preview)

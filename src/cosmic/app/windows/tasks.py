@@ -190,6 +190,7 @@ class TaskLayout(QObject):
         window.use_workspaces(workspaces(others), self.central_view)
         self._add_drawer()
         self._settings = settings
+        self._formula_waits = False
         self._lens_start = LensStart(rig, self)
         self._connect()
 
@@ -257,7 +258,8 @@ class TaskLayout(QObject):
         self._watch.stop()
         if self.force is not None:
             calculation = self.force.calculated.calculation
-            self._settings.setValue(_FORMULA, calculation.formula if calculation else "")
+            if calculation is not None or not self._formula_waits:
+                self._settings.setValue(_FORMULA, calculation.formula if calculation else "")
         self.results.shut_down()
         if self._log is not None:
             self._log.close()
@@ -284,7 +286,10 @@ class TaskLayout(QObject):
             made.chosen.connect(self._on_workspace)
         if self.force is not None:
             self.force.written.connect(self._on_written)
-            self.force.calculate(str(self._settings.value(_FORMULA, "")))
+            formula = str(self._settings.value(_FORMULA, ""))
+            self.force.calculate(formula)
+            # It may be that of another platform, or its channels may be away now.
+            self._formula_waits = bool(formula) and self.force.calculated.calculation is None
             self.force.by_time.click()  # the force itself is what is looked at first
         self._gui.initialisation_begun.connect(self._lens_start.begin)
         self._lens_start.said.connect(window.drawer.line.set_text)

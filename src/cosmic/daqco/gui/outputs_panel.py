@@ -96,6 +96,7 @@ class OutputsPanel(QWidget):
         super().__init__(parent)
         self._daqco = daqco
         self.rows: dict[str, OutputRow] = {}
+        self._trouble = ""
         self.state = Chip("OUTPUTS", tip="Whether outputs may be set")
         self.refusal = ElidedLabel()
         self.safe = QPushButton("Stop outputs")
@@ -143,8 +144,9 @@ class OutputsPanel(QWidget):
         self.reset.setVisible(bool(stopped))
         self.reset.setEnabled(not away)
         problem = next((each.problem for each in states if each.problem), "")
-        if problem or stopped:
-            self._say(problem or stopped)
+        before, self._trouble = self._trouble, problem or stopped
+        if self._trouble or before:  # else a refusal stands there
+            self._say(self._trouble)
 
     def _make_rows(self, states: tuple[OutputState, ...]) -> None:
         while (item := self._grid.takeAt(0)) is not None:

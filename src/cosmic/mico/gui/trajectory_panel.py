@@ -110,7 +110,6 @@ class TrajectoryPanel(QWidget):
     def _connect(self) -> None:
         self._loaded_relay = Relay(self._on_loaded)
         self._rehearsed_relay = Relay(self._on_rehearsed)
-        self._failed_relay = Relay(self._on_failed)
         self._recorder.recorded.connect(self.open)
         self.open_button.clicked.connect(self._on_open)
         self.mirror_button.clicked.connect(self.mirror)
@@ -225,16 +224,21 @@ class TrajectoryPanel(QWidget):
                     trajectory, task.report, speed=speed, cancelled=lambda: task.cancel_requested
                 )
             except CosmicError as exc:
-                self._failed_relay(str(exc))
+                self._rehearsed_relay(trajectory, exc)
                 task.fail(exc)
             else:
-                self._rehearsed_relay(found)
+                self._rehearsed_relay(trajectory, found)
                 task.finish()
 
         self._say("rehearsing", State.BUSY)
         self._begin(f"Rehearsing {trajectory.name}", play)
 
-    def _on_rehearsed(self, found: Rehearsal) -> None:
+    def _on_rehearsed(self, trajectory: Trajectory, found: Rehearsal | CosmicError) -> None:
+        if trajectory is not self.trajectory:
+            return  # another is shown by now, and nobody rehearsed that
+        if isinstance(found, CosmicError):
+            self._on_failed(str(found))
+            return
         self._show_rehearsal(found)
         self.preview_changed.emit(found.poses)
 

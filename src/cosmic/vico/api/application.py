@@ -68,7 +68,7 @@ class VicoApplication(TaskApplication):
         self.policy = policy
         self.settings = settings
         self.clock = clock
-        self.libraries = CameraLibraries(make_library)
+        self.libraries = CameraLibraries(make_library, settings.camera)
         self.zoom_scale: ZoomScale = settings.lens.zoom_scale()
         self.focus_models = FocusModels()
         self.position_source: Callable[[float], Mapping[str, float]] | None = None
@@ -124,8 +124,16 @@ class VicoApplication(TaskApplication):
         return self.begin("Looking for cameras", job)
 
     def use(self, camera: str, key: str) -> Task:
-        """Begin to take the images of `camera` with the one of that key."""
-        self.unit(camera).use(key)
+        """Begin to take the images of `camera` with the one of that key.
+
+        Raises
+        ------
+        ConfigError
+            There is no such camera on the platform, or that key is one of another backend.
+        """
+        unit = self.unit(camera)
+        self.libraries.check_backend(unit.config, key)
+        unit.use(key)
         task = Task(f"{camera}: {key}")
         task.finish()
         return task

@@ -28,7 +28,14 @@ from cosmic.vico.api.camera_images import (
     always,
 )
 from cosmic.vico.api.camera_shape import CameraShape
-from cosmic.vico.api.camera_shown import FormatShown, LinkShown, Seen, formats_shown, links_shown
+from cosmic.vico.api.camera_shown import (
+    FormatShown,
+    LinkShown,
+    Seen,
+    formats_shown,
+    links_shown,
+    utc_of,
+)
 from cosmic.vico.api.coordinate_transform import CoordinateTransform, RotationShown
 from cosmic.vico.api.sent_image import SentImage, SentSeen
 from cosmic.vico.core.camera_recordings import ImageRecordingState
@@ -410,8 +417,8 @@ class CameraHandle(CameraCoordinates, CameraShape, Declared):
                 image = self._unit.shown()
                 if image is None:
                     raise NotAvailable(f"{self.name}: {self.problem or 'no image yet'}")
-                axes = self._unit.recordings.axes
-                save_image(image, path, axes=axes, overwrite=overwrite)
+                axes, taken = self._unit.recordings.axes, utc_of(image, self.clock)
+                save_image(image, path, axes=axes, overwrite=overwrite, utc=taken)
                 task.finish()
             except CosmicError as exc:
                 task.fail(exc)

@@ -1,11 +1,15 @@
 """What a camera's view shows of its recordings and of machine vision."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Self
 
+from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.plan_shape import unix_of_platform_s
 from cosmic.frame.renamed import Renamed
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.recording.formats import FORMATS, ImageFormat, recording_suffix
@@ -16,6 +20,15 @@ from cosmic.vico.hw.interface import CameraSettings
 
 if TYPE_CHECKING:
     from cosmic.vico.core.vision.fibre import Fibre
+
+
+def utc_of(image: CameraImage, clock: Clock) -> datetime:
+    """Return when an image was exposed: what is shown may be old, where the camera stopped."""
+    exposed_s = image.frame.exposed_s
+    if not math.isfinite(exposed_s):  # a camera that does not tell
+        return datetime.now(UTC)
+    return datetime.fromtimestamp(unix_of_platform_s(clock, exposed_s), UTC)
+
 
 DESCRIPTIONS = {
     "focus": "how sharp the image is",

@@ -1,10 +1,10 @@
 """`CameraLibraries`: the drivers in use, and which camera belongs to whom."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from threading import RLock
 
-from cosmic.frame.errors import CosmicError, NotConnectedError
+from cosmic.frame.errors import ConfigError, CosmicError, NotConnectedError
 from cosmic.vico.core.settings import CameraConfig
 from cosmic.vico.hw.interface import Camera, CameraInfo, CameraLibrary
 
@@ -18,13 +18,18 @@ class CameraLibraries:
     ----------
     make : callable
         Returns the library of a backend; raises `CosmicError` where it is not installed.
+    configured : iterable of CameraConfig
+        Cameras of the platform: one that is named by its key is no other's, opened or not.
     """
 
-    def __init__(self, make: Callable[[str], CameraLibrary]) -> None:
+    def __init__(
+        self, make: Callable[[str], CameraLibrary], configured: Iterable[CameraConfig] = ()
+    ) -> None:
         self._make = make
         self._lock = RLock()
         self._libraries: dict[str, CameraLibrary] = {}
-        self._taken: dict[str, tuple[str, str]] = {}
+        self._taken = {each.name: (each.backend, each.key) for each in configured if each.key}
+        self._found: dict[str, frozenset[str]] = {}
 
     def library(self, backend: str) -> CameraLibrary:
         """Return the driver of a backend; raises `CosmicError` where it is not there."""
@@ -63,13 +68,31 @@ class CameraLibraries:
         """Look for the cameras of every driver in use; one that cannot tell is logged."""
         found: list[CameraInfo] = []
         with self._lock:
-            libraries = tuple(self._libraries.values())
-        for library in libraries:
+            libraries = dict(self._libraries)
+        for backend, library in libraries.items():
             try:
-                found += library.cameras()
+                there = library.cameras()
             except CosmicError as exc:
                 logger.warning("%s: %s", library.name, exc)
+                there = ()
+            self._found[backend] = frozenset(info.key for info in there)
+            found += there
         return tuple(found)
+
+    def check_backend(self, config: CameraConfig, key: str) -> None:
+        """Refuse a camera that the last look found with other drivers only.
+
+        Raises
+        ------
+        ConfigError
+            It was; the text names the driver.
+        """
+        drivers = [backend for backend, keys in self._found.items() if key in keys]
+        if drivers and config.backend not in drivers:
+            raise ConfigError(
+                f"{config.name} takes its images with {config.backend!r}, and {key} is a camera of "
+                f"{drivers[0]!r}; change the backend of {config.name} in the platform file"
+            )
 
     def close(self) -> None:
         """Give everything back."""

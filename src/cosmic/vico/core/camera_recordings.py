@@ -127,12 +127,12 @@ class CameraRecordings:
                 text = f"{lapse.taken} images, {lapse.late} late, {lapse.missed} missed"
                 task.report(lapse.taken / whole if whole else 0.0, text)
             if lapse.done:  # also where no image came until after the end
-                self.request_stop()
+                self._request_stop_of(writer)
 
         with self._lock:
             writer = self._begin(path, image_format, overwrite=overwrite)
             self._task = task
-            task.on_cancel(self.request_stop)
+            task.on_cancel(lambda: self._request_stop_of(writer))
             self._unsubscribe = self._camera.subscribe(choose)
         self._changed.emit()
         return task
@@ -144,6 +144,7 @@ class CameraRecordings:
         if settings is None:
             reason = self._camera.problem or "it is not connected"
             raise NotAvailable(f"{self._camera.camera_name} cannot be recorded: {reason}")
+        self._end_images()
         self._join_last()
         traits(image_format)  # says which there are
         writer = ImageRecorder(
@@ -164,13 +165,21 @@ class CameraRecordings:
 
     def request_stop(self) -> None:
         """Ask for the file to be closed; returns at once."""
+        self._request_stop_of(self._writer)
+
+    def _request_stop_of(self, writer: ImageRecorder | None) -> None:
+        """End one recording, and none that was begun after it."""
         with self._lock:
-            unsubscribe, self._unsubscribe = self._unsubscribe, None
-            writer = self._writer
+            if writer is None or writer is not self._writer:
+                return
+            self._end_images()
+        writer.request_end()
+
+    def _end_images(self) -> None:
+        """Hand on no more images; one may be on its way yet."""
+        unsubscribe, self._unsubscribe = self._unsubscribe, None
         if unsubscribe is not None:
             unsubscribe()
-        if writer is not None:
-            writer.request_end()
 
     def stop(self) -> None:
         """Close the file and wait until it is closed; harmless when nothing is recorded."""
@@ -189,6 +198,7 @@ class CameraRecordings:
         self._changed.emit()
 
     def _on_closed(self, path: Path) -> None:
+        self._end_images()  # it may have ended by itself; without the lock, which waits for this
         task, self._task = self._task, None
         writer = self._writer
         error: CosmicError | None = writer.error if writer is not None else None

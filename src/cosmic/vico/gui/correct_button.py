@@ -5,7 +5,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QStandardPaths, Qt, Signal
 from PySide6.QtWidgets import QToolButton, QWidget
 
 from cosmic.frame.errors import CosmicError
@@ -14,6 +14,7 @@ from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import State, state_look
 from cosmic.frame.operation import Operation
 from cosmic.vico.api.camera import CameraHandle
+from cosmic.vico.api.camera_shown import utc_of
 from cosmic.vico.core.image import CameraImage
 
 # The editor loads what finds fibres, and that a part of SciPy: too much for a window to open with.
@@ -86,8 +87,9 @@ class CorrectButton(QToolButton):
             return
         from cosmic.vico.gui.fibre_editor import FibreEditor
 
-        path = self._camera.directory / f"fibres-{self._now():%Y%m%d-%H%M%S}.tif"
-        editor = FibreEditor(image.data, corrections, lambda: save(image, corrections, path))
+        path = self._folder / f"fibres-{self._now():%Y%m%d-%H%M%S}.tif"
+        taken = utc_of(image, self._camera.clock)
+        editor = FibreEditor(image.data, corrections, lambda: save(image, corrections, path, taken))
         editor.setParent(self.window(), Qt.WindowType.Window)
         editor.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         editor.setWindowTitle(f"Fibres of {self._camera.name}")
@@ -97,6 +99,15 @@ class CorrectButton(QToolButton):
         self.editor = editor
         self.message.emit("")
 
+    @property
+    def _folder(self) -> Path:
+        """Where images go; the editor is here, and so is its disk."""
+        if not self._camera.remote:
+            return self._camera.directory
+        place = QStandardPaths.StandardLocation.DocumentsLocation
+        documents = Path(QStandardPaths.writableLocation(place))
+        return documents if documents.is_dir() else Path.home()
+
     def _on_closed(self) -> None:
         self.editor = None
 
@@ -104,10 +115,12 @@ class CorrectButton(QToolButton):
         self.message.emit(f"{state_look(State.REFUSED).glyph} {reason}")
 
 
-def save(image: CameraImage, corrections: "Corrections", path: Path) -> str:
+def save(
+    image: CameraImage, corrections: "Corrections", path: Path, utc: datetime | None = None
+) -> str:
     """Keep an image, once, and its corrections beside it; raises `RecordingError`."""
     from cosmic.vico.core.recording.snap import save_image
 
     if not path.exists():
-        save_image(image, path)
+        save_image(image, path, utc=utc)
     return f"Kept in {corrections.save(path)}."

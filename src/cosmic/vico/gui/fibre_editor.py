@@ -6,8 +6,16 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 from PySide6.QtCore import QPointF, Qt
-from PySide6.QtGui import QKeySequence, QPainter, QPainterPath, QPolygonF, QShortcut
-from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QLabel, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtGui import QCloseEvent, QKeySequence, QPainter, QPainterPath, QPolygonF, QShortcut
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QHBoxLayout,
+    QLabel,
+    QMessageBox,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, tipped
@@ -147,6 +155,8 @@ class FibreEditor(QWidget):
         super().__init__(parent)
         self.corrections = corrections
         self._save = save
+        self._kept = corrections.edits
+        self.question: QMessageBox | None = None
         self.view = CameraImageView()
         self.view.setMinimumSize(320, 240)
         self.view.show_image(_as_camera_image(image))
@@ -208,6 +218,35 @@ class FibreEditor(QWidget):
             self.note.setText(self._save())
         except CosmicError as exc:
             self.note.setText(str(exc))
+        else:
+            self._kept = self.corrections.edits
+
+    @override
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Ask first while edits are not kept: nothing brings them back."""
+        if self.corrections.edits == self._kept:
+            super().closeEvent(event)
+            return
+        event.ignore()
+        if self.question is None:
+            buttons = QMessageBox.StandardButton
+            box = QMessageBox(self)
+            box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+            box.setWindowTitle("Close")
+            box.setText("Save the corrections before the window closes?")
+            box.setStandardButtons(buttons.Save | buttons.Discard | buttons.Cancel)
+            box.finished.connect(self._on_answered)
+            self.question = box
+            box.open()
+
+    def _on_answered(self, answer: int) -> None:
+        self.question = None
+        if answer == QMessageBox.StandardButton.Save:
+            self._on_save()
+        elif answer == QMessageBox.StandardButton.Discard:
+            self._kept = self.corrections.edits
+        if answer != QMessageBox.StandardButton.Cancel and self.corrections.edits == self._kept:
+            self.close()
 
     def _edited(self, act: Callable[[], None]) -> None:
         """Change something; what is refused is shown and changes nothing."""

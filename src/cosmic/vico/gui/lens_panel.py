@@ -6,7 +6,7 @@ from typing import Final
 from PySide6.QtCore import QSize, QTimer
 from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QPushButton, QWidget
 
-from cosmic.frame.errors import CosmicError
+from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.gui.build import named, push_button, styled, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
@@ -128,8 +128,7 @@ class LensPanel(QWidget):
         homed = all(state is not None and state.homed for state in states)
         self._show_state(lens, states, homed=homed)
         self._allow(lens.problem, lens.problem or ("" if homed else NOT_HOMED))
-        low, high = lens.zoom_range
-        self.zoom.set_range(low, high)
+        self._show_zoom_range(lens)
         self.zoom.set_value(None if lens.zoom is None or not homed else round(lens.zoom, 2))
         for step in lens.steps:
             here = homed and lens.zoom is not None and abs(lens.zoom / step.zoom - 1.0) < 0.01
@@ -138,6 +137,13 @@ class LensPanel(QWidget):
         if focus is not None and focus.limit_counts > 0:
             self.focus.set_range(0.0, float(focus.limit_counts), 1.0)
             self.focus.set_value(float(focus.position_counts) if focus.homed else None)
+
+    def _show_zoom_range(self, lens: LensHandle) -> None:
+        """Accept the magnifications of the table; without one nothing can be typed."""
+        try:
+            self.zoom.set_range(*lens.zoom_range)
+        except ConfigError as exc:
+            self.zoom.set_usable(lens.problem or str(exc))
 
     def _show_state(self, lens: LensHandle, states: list[LensState | None], *, homed: bool) -> None:
         moving = any(state is not None and state.moving for state in states)

@@ -1,5 +1,7 @@
 """The widgets of ViCo together: one view a camera, and the lens."""
 
+from collections import Counter
+
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 
@@ -30,8 +32,12 @@ def make_vico_gui(application: CosmicApplicationBase) -> VicoGui:
     """Make the GUI component of ViCo; GUI thread."""
     vico = vico_of(application)
     gui = VicoGui(vico)
+    titles = {name: vico.camera(name).title for name in gui.cameras}
+    alike = Counter(titles.values())
     for name, view in gui.cameras.items():
-        view.setWindowTitle(vico.camera(name).title)
+        # A window keeps its panels by their titles: of two of one title it would show one.
+        title = titles[name]
+        view.setWindowTitle(title if alike[title] == 1 else f"{title} ({name})")
     return gui
 
 

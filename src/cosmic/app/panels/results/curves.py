@@ -62,7 +62,7 @@ class ResultCurves(CurveFrame):
             line.sigDragged.connect(self._on_dragged)
             box.addItem(line, ignoreBounds=True)
             box.setMouseEnabled(x=False, y=False)
-        self._unit, self._across = "", TIME
+        self._unit, self._across, self._unit_across = "", TIME, "s"
         self._part_s: tuple[float, float] | None = None
         self._path: Path | None = None
         self.cursors.hide()
@@ -166,7 +166,8 @@ class ResultCurves(CurveFrame):
         self._layout.layout.setRowMaximumHeight(1, 10_000.0 if shown else 0.0)
         words = ", ".join(each.name for each in moved)
         words = words if len(words) < 22 else f"{len(moved)} axes"
-        self._names[self._places] = f"{words}, µm"
+        units = dict.fromkeys(display_unit(each.unit) for each in moved)
+        self._names[self._places] = ", ".join((words, *units))
 
     def _draw(self, box: pg.ViewBox, colour: str, where: Values, what: Values) -> None:
         curve = pg.PlotCurveItem(where, what, connect="finite")
@@ -186,7 +187,8 @@ class ResultCurves(CurveFrame):
         self._unit = display_unit(unit)
         self._names[self._left] = f"{channel}, {self._unit}" if channel else ""
         axis = next((each for each in timeline.positions if each.name == self._across), None)
-        named = f"{axis.name}, {display_unit(axis.unit)}" if axis is not None else "time, s"
+        self._unit_across = display_unit(axis.unit) if axis is not None else "s"
+        named = f"{axis.name if axis is not None else 'time'}, {self._unit_across}"
         if axis is not None and self._part_s is not None:
             named += f", from {self._part_s[0]:.2f} s to {self._part_s[1]:.2f} s"
         self._names[self._below] = named
@@ -238,9 +240,8 @@ class ResultCurves(CurveFrame):
 
     def slope(self, number: int = 0) -> Slope | None:
         """Return the line through what lies between the cursors; None: too little does."""
-        across = "s" if self._across == TIME else "µm"
         try:
-            return fit_slope(*self.between(number), f"{self._unit}/{across}")
+            return fit_slope(*self.between(number), f"{self._unit}/{self._unit_across}")
         except RecordingError:
             return None
 
@@ -248,6 +249,11 @@ class ResultCurves(CurveFrame):
     def unit(self) -> str:
         """Of the force, as the operator reads it."""
         return self._unit
+
+    @property
+    def unit_across(self) -> str:
+        """Of what lies along the horizontal axis, as the operator reads it."""
+        return self._unit_across
 
     def show_moment(self, after_s: float, point: tuple[float, float] | None) -> None:
         """Show which moment the rest of the viewer shows; `point` lies on the first curve."""

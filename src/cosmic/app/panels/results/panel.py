@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from cosmic.app.panels.results.pictures import still_pixels
 from cosmic.app.panels.results.session_list import THUMBNAIL, SessionList
 from cosmic.app.panels.results.viewer import ResultViewer
 from cosmic.app.results.sessions import Item, ItemKind
@@ -70,6 +71,7 @@ class ResultsPanel(QWidget):
         self.setObjectName("resultsPanel")
         self._jobs = BackgroundJobs("results", policy)
         self._asked: tuple[Item, ...] = ()
+        self._being_read: tuple[Item, ...] = ()
         self._loading = False
         self._state = (0, 0)
         self._loaded = Relay(self._on_loaded)
@@ -145,36 +147,31 @@ class ResultsPanel(QWidget):
     def _load(self) -> None:
         """Have what is chosen read; while something is read, only the newest choice waits."""
         asked = self._asked
-        if self._loading:
+        if self._loading or (asked and asked[0].kind is ItemKind.CAMPAIGN):
             return
         if not asked:
             self.viewer.show_timelines(())
             return
         self._loading = True
+        self._being_read = asked
         self._state = _state_of(asked[0])
         beside = [each for session in self.sessions.sessions for each in session.items]
 
-        def load() -> tuple[tuple[Item, ...], list[Timeline]]:
+        def load() -> list[Timeline]:
             first = load_timeline(asked[0], beside)
-            return asked, [first, *(load_timeline(each) for each in asked[1:])]
+            return [first, *(load_timeline(each) for each in asked[1:])]
 
         self._jobs.do(load, self._loaded)
 
-    def _on_loaded(
-        self,
-        found: tuple[tuple[Item, ...], list[Timeline]] | None,
-        error: CosmicError | None,
-    ) -> None:
+    def _on_loaded(self, timelines: list[Timeline] | None, error: CosmicError | None) -> None:
         self._loading = False
-        if found is None:
-            self.viewer.show_timelines(())
-            self.message.set_text(f"It cannot be shown: {error}")
-            return
-        asked, timelines = found
-        if asked == self._asked:
+        if self._being_read != self._asked:  # others were chosen meanwhile
+            self._load()
+        elif timelines is not None:
             self.viewer.show_timelines(timelines)
         else:
-            self._load()
+            self.viewer.show_timelines(())
+            self.message.set_text(f"It cannot be shown: {error}")
 
     def _on_follow(self) -> None:
         """Show what was added to a recording that is still written."""
@@ -202,16 +199,17 @@ class ResultsPanel(QWidget):
         if path is None:
             return
         base = free_base(path.parent, f"{path.stem}_seen")
+        picture = base.with_name(f"{base.name}.png")  # a name may have full stops of its own
         try:
-            if not self.viewer.grab().save(str(base.with_suffix(".png"))):
-                raise OSError(f"{base.with_suffix('.png')} cannot be written")
+            if not self.viewer.grab().save(str(picture)):
+                raise OSError(f"{picture} cannot be written")
             values = self.viewer.between_cursors()
             if values:
                 write_values(base.with_name(f"{base.name}_values.csv"), values, self.viewer)
         except OSError as exc:
             self.message.set_text(f"Not written: {exc}")
             return
-        self._written = base.with_suffix(".png")
+        self._written = picture
         also = f" and {base.name}_values.csv" if values else ""
         self.message.set_text(f"written: {self._written}{also}")
 
@@ -263,11 +261,12 @@ def open_with_desktop(path: Path) -> None:
 
 
 def free_base(folder: Path, base: str) -> Path:
-    """Return a path, without ending, of which no file is there yet."""
-    number = 1
-    while any(folder.glob(f"{base}{'' if number == 1 else f'_{number}'}*.png")):
+    """Return a path, without ending, of which no image and no table is there yet."""
+    number, name = 1, base
+    while any((folder / f"{name}{each}").exists() for each in (".png", "_values.csv")):
         number += 1
-    return folder / (base if number == 1 else f"{base}_{number}")
+        name = f"{base}_{number}"
+    return folder / name
 
 
 def write_values(
@@ -306,7 +305,7 @@ def thumbnail_of(item: Item) -> QImage | None:
         if item.kind is ItemKind.IMAGE:
             from cosmic.vico.core.measuring.image_files import read_images
 
-            return _scaled(next(iter(read_images(item.path))).pixels)
+            return _scaled(still_pixels(next(iter(read_images(item.path))).pixels))
     except (CosmicError, OSError, IndexError, ValueError, StopIteration) as exc:
         logger.debug("%s has no thumbnail: %s", item.path, exc)
     return None

@@ -3,9 +3,10 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
+import numpy.typing as npt
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QLabel, QSplitter, QStackedWidget, QVBoxLayout, QWidget
 
@@ -76,15 +77,30 @@ class FilmReader:
         if film.path.suffix.lower() in STILLS:
             from cosmic.vico.core.measuring.image_files import read_images
 
-            page = next(iter(read_images(film.path)))
-            pixels = page.pixels[..., 2::-1] if page.pixels.ndim == 3 else page.pixels
-            wide = page.pixels.dtype.itemsize > 1
-            data: Pixels = pixels.astype(np.uint16) if wide else pixels.astype(np.uint8)
+            data = still_pixels(next(iter(read_images(film.path))).pixels)
             return RecordedImage(data, 0, None)
         if self._open is None or film.path != self._path or index >= len(self._open):
             self.close()
             self._open, self._path = open_image_recording(film.path), film.path
         return self._open[index]
+
+
+def still_pixels(pixels: npt.NDArray[np.generic]) -> Pixels:
+    """Return an image of another program as a camera would give it: grey, or red, green and blue.
+
+    Colours have 8 bits; what a camera cannot give, such as floats, becomes grey of 16 bits.
+    """
+    # Imported here: it loads OpenCV.
+    from cosmic.vico.core.vision.grey import grey_image
+
+    unsigned = pixels.dtype.kind == "u" and pixels.dtype.itemsize <= 2
+    if unsigned and pixels.ndim == 2:
+        return cast("Pixels", pixels.astype(pixels.dtype.newbyteorder("="), copy=False))
+    if unsigned and pixels.ndim == 3 and pixels.shape[2] in (3, 4):
+        colours = pixels[..., 2::-1]
+        wide = colours.astype(np.uint16) >> (8 * (pixels.dtype.itemsize - 1))
+        return wide.astype(np.uint8)
+    return grey_image(pixels)
 
 
 def _camera_image(camera: str, recorded: RecordedImage) -> CameraImage:

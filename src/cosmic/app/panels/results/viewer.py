@@ -346,8 +346,7 @@ class ResultViewer(QWidget):
 
     def _show_slope(self) -> None:
         texts = []
-        over = "s" if self.curves.across == TIME else "µm"
-        low, high = self.curves.region
+        over, (low, high) = self.curves.unit_across, self.curves.region
         for number, (name, _, _, _) in enumerate(self.curves.lines):
             line = self.curves.slope(number)
             _, what = self.curves.between(number)
