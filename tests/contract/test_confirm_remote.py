@@ -18,9 +18,9 @@ ASKED = "is the plate clear?"
 
 
 @contextmanager
-def remote(policy: FailurePolicy) -> Iterator[Mico]:
+def remote(policy: FailurePolicy, times: int = 1) -> Iterator[Mico]:
     """MiCo of a station whose initialisation asks, as a program at another station has it."""
-    steps = {"initialisation": {"step": [{"do": "confirm", "text": ASKED}]}}
+    steps = {"initialisation": {"step": [{"do": "confirm", "text": ASKED}] * times}}
     with mico(**steps) as (here, _controller):
         station, side = Station("fibres", FailurePolicy()), Host("mico", here)
         station.host("mico", side)
@@ -44,6 +44,14 @@ def test_the_answer_of_a_program_at_another_station_counts() -> None:
         assert asked == [ASKED]
         with pytest.raises(MoveCancelled, match="answered with no"):
             far.initialise(confirm=lambda _text: False)
+
+
+def test_the_same_question_twice_in_a_row_is_asked_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cosmic.mico.api.client.POLL_S", 0.5)  # so that no look falls in between
+    asked: list[str] = []
+    with remote(FailurePolicy(), times=2) as far:
+        far.initialise(confirm=lambda text: not asked.append(text))
+    assert asked == [ASKED, ASKED]
 
 
 @pytest.mark.defects

@@ -103,12 +103,15 @@ class TrialResult:
         truth.
     scale : str
         How the scale of the force was known.
+    exit_code : int
+        How a whole campaign ended, as `cosmic campaign` says it; 0: as was asked.
     """
 
     seal: str
     frozen: str
     rows: tuple[TrialRow, ...]
     scale: str = ""
+    exit_code: int = 0
 
 
 def sealed_program() -> Path:
@@ -322,19 +325,21 @@ def table_of(results: Sequence[TrialResult]) -> list[str]:
         lines += [_line(row) for row in rows]
     good = [row for row in rows if row.measured.trusted]
     inside = sum(row.inside for row in good)
-    part = inside / len(good) if good else math.nan
-    error = 196.0 * math.sqrt(max(part * (1.0 - part), 0.02) / len(good)) if good else math.nan
     off = sum(row.off_by_twice for row in good)
     right = [row for row in rows if row.inside and row.measured.half_percent <= 30.0]
     thrown = sum(not row.measured.trusted for row in right)
     halves = [row.measured.half_percent for row in good]
+    lines.append(f"measured {len(rows)}, good {len(good)}")
+    if not good:
+        return [*lines, "no value is good: there is nothing to compare"]
+    part = inside / len(good)
+    error = 196.0 * math.sqrt(max(part * (1.0 - part), 0.02) / len(good))
     lines += [
-        f"measured {len(rows)}, good {len(good)}",
         f"interval holds the truth: {inside} of {len(good)}, {100.0 * part:.1f} "
         f"± {error:.1f} % (95 % expected)",
         f"good and off by more than twice the half width: {off}",
         f"right and thrown away: {thrown} of {len(right)}",
-        f"half width, median: {np.median(halves) if halves else math.nan:.1f} %",
+        f"half width, median: {np.median(halves):.1f} %",
     ]
     return lines
 

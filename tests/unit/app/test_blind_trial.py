@@ -111,6 +111,23 @@ def test_the_table_counts_what_is_inside_off_by_twice_and_thrown_away() -> None:
     assert text.count("OUTSIDE") == 2
 
 
+def test_where_no_value_is_good_the_table_says_so_and_not_nan() -> None:
+    rows = (TrialRow(measured(0, 5.0e-11, 4.0, trusted=False), 5.1e-11),)
+    for each in (rows, ()):
+        text = "\n".join(table_of([TrialResult("s", "f", each)]))
+        assert f"measured {len(each)}, good 0" in text
+        assert "nothing to compare" in text
+        assert "nan" not in text
+
+
+def test_a_campaign_that_did_not_come_to_its_end_gives_the_trial_its_exit_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ended = TrialResult("s", "f", (), exit_code=3)
+    monkeypatch.setattr("cosmic.app.commands.blind_trial.whole", lambda *_given: ended)
+    assert main(["blind-trial", "--whole", "quick", "--out", str(tmp_path / "trial")]) == 3
+
+
 def test_the_truth_of_a_fibre_is_that_of_its_longest_span() -> None:
     facts = (
         (10.0, {"fibre": 4, "abscissa_um": 300.0, "ei_n_m2": 3e-11}),

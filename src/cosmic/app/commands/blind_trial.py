@@ -34,6 +34,8 @@ SEED_BITS: Final = 48
 def run(chosen: argparse.Namespace) -> int:
     """Carry out a blind trial, print its table and return the exit code.
 
+    That of a whole campaign is the one with which it ended.
+
     Raises
     ------
     CosmicError
@@ -48,7 +50,7 @@ def run(chosen: argparse.Namespace) -> int:
             for _ in range(chosen.sessions)
         ]
     sys.stdout.write("\n".join(table_of(results)) + "\n")
-    return 0
+    return max(each.exit_code for each in results)
 
 
 def whole(recipe: Path, folder: Path | None, world: str) -> TrialResult:
@@ -75,7 +77,7 @@ def whole(recipe: Path, folder: Path | None, world: str) -> TrialResult:
     command += ["--seed", str(seed), "--world", world, "--truth", str(truth)]
     said = folder / SEALED / "output.txt"  # it names the seed
     with said.open("wb") as output:
-        _run_to_its_end(command, output)
+        code = _run_to_its_end(command, output)
     reader = CampaignReader(campaign)
     try:
         reader.check()
@@ -99,14 +101,16 @@ def whole(recipe: Path, folder: Path | None, world: str) -> TrialResult:
     )
     scale = scale_in(reader.analysis())
     words = "verified" if scale is not None and scale.verified else "not verified"
-    return TrialResult(seal, frozen, rows, words)
+    if code:
+        sys.stderr.write(f"the campaign ended with exit code {code}: {said} says why\n")
+    return TrialResult(seal, frozen, rows, words, code)
 
 
-def _run_to_its_end(command: list[str], output: IO[bytes]) -> None:
-    """Run a program; it ends in order where this one is interrupted."""
+def _run_to_its_end(command: list[str], output: IO[bytes]) -> int:
+    """Run a program and return its exit code; it ends in order where this one is interrupted."""
     with subprocess.Popen(command, stdout=output, stderr=output, **own_session()) as process:
         try:
-            process.wait()
+            return process.wait()
         except BaseException:
             process.terminate()  # and it is waited for
             raise

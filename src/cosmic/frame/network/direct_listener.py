@@ -1,5 +1,6 @@
 """Where clients that were let in open direct lines, and strangers do no harm."""
 
+import errno
 import logging
 import selectors
 import socket
@@ -31,6 +32,9 @@ PENDING_LIMIT: Final = 32
 """So many may be about to say who they are; the oldest makes room for one more."""
 GREETING_LIMIT_S: Final = 2.0
 """Whoever has not said by then who it is, is turned away."""
+FULL_S: Final = 0.05
+"""Until somebody is tried to be taken again where there are too many open files."""
+_FULL: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
 _ACCEPTED_AT_ONCE: Final = 4
 
 Attach = Callable[[str, str, str | None, bool, FramedSocket], None]
@@ -121,8 +125,10 @@ class DirectListener(WorkerThread):
         for _ in range(_ACCEPTED_AT_ONCE):
             try:
                 stream, address = self._server.accept()
-            except OSError:  # nobody is there any more, or there are too many open files
-                return
+            except OSError as exc:
+                if exc.errno in _FULL:  # who waits is told of again at once, and can't be taken
+                    WALL.sleep(FULL_S)
+                return  # or nobody is there any more
             where = f"{address[0]}:{address[1]}"
             if self._refused.of(address[0]) >= AT_ONCE:  # calls of its own go over the engine
                 stream.close()

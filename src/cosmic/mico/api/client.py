@@ -220,12 +220,14 @@ class MicoClient(MicoApplicationBase):
         """Answer the questions of the sequence until it has ended."""
         over = Event()
         begun.add_callback(lambda _ended: over.set())
-        answered = ""
+        answered: tuple[int | None, str] = (None, "")
         while confirm is not None and not over.wait(POLL_S):
-            question = self.api.initialisation.question
-            if question and question != answered:
-                self.api.answer(confirmed(confirm, question))
-            answered = question
+            report = self.api.initialisation
+            # By its step: the next one may ask the same before anybody has looked in between.
+            asked = (report.running, report.question)
+            if report.question and asked != answered:
+                self.api.answer(confirmed(confirm, report.question))
+            answered = asked
 
 
 def _accompany(begun: Operation[None], task: Task) -> None:

@@ -1,5 +1,6 @@
 """Direct lines: what goes over them, who is kept out, and what happens when they break."""
 
+import errno
 import secrets
 import socket
 import ssl
@@ -407,6 +408,29 @@ def test_a_client_gives_its_secrets_to_no_other_station(
         listener.request_end()
         listener.join()
     assert not heard
+
+
+def test_a_program_without_free_files_does_not_spin_while_somebody_waits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tried: list[float] = []
+
+    def full(_server: socket.socket) -> None:
+        tried.append(WALL.now_s())
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(socket.socket, "accept", full)
+    line = Line(f"tcp/127.0.0.1:{free_port()}", True, "fibres")
+    listener = DirectListener("full", line, FailurePolicy(), lambda *_said: None)
+    listener.start()
+    try:
+        with socket.create_connection(("127.0.0.1", listener.port), 2.0):
+            assert wait_until(lambda: len(tried) > 1), "it is tried again"
+            WALL.sleep(0.5)
+    finally:
+        listener.request_end()
+        listener.join()
+    assert len(tried) < 100
 
 
 def test_a_client_comes_back_when_its_station_was_restarted(served: Served) -> None:

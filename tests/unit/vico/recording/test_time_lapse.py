@@ -56,6 +56,7 @@ def test_an_image_of_no_known_time_is_not_taken():
     ("wrong", "said"),
     [
         ({"interval_s": 0.0}, "interval 0.0 s"),
+        ({"interval_s": 1e-9}, "0.001 s is the shortest"),
         ({"interval_s": math.nan}, "interval nan s"),
         ({"interval_s": math.inf}, "interval inf s"),
         ({"interval_s": 1.0, "count": 0}, "0 images"),

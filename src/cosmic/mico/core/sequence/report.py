@@ -35,3 +35,9 @@ class SequenceReport:
 
     steps: tuple[StepReport, ...]
     question: str = ""
+
+    @property
+    def running(self) -> int | None:
+        """Place of the step that is carried out; None while there is none."""
+        states = (each.state for each in self.steps)
+        return next((n for n, state in enumerate(states) if state is StepState.RUNNING), None)

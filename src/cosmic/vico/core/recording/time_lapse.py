@@ -2,8 +2,11 @@
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from cosmic.frame.errors import ConfigError
+
+SHORTEST_S: Final = 0.001
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +25,7 @@ class TimeLapsePlan:
     Raises
     ------
     ConfigError
-        An interval or a number that is not above 0.
+        An interval or a number that is not above 0, or an interval below a millisecond.
     """
 
     interval_s: float
@@ -32,6 +35,10 @@ class TimeLapsePlan:
     def __post_init__(self) -> None:
         if not 0.0 < self.interval_s < math.inf:
             raise ConfigError(f"time-lapse: interval {self.interval_s!r} s; it must be above 0")
+        if self.interval_s < SHORTEST_S:  # each that is due is counted, also those without an image
+            raise ConfigError(
+                f"time-lapse: interval {self.interval_s!r} s; {SHORTEST_S:g} s is the shortest"
+            )
         if self.count is not None and not self.count > 0:
             raise ConfigError(f"time-lapse: {self.count!r} images; there must be one at least")
         if self.until_s is not None and math.isnan(self.until_s):
