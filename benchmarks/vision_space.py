@@ -128,13 +128,19 @@ def two_images(magnification: float, runs: int) -> list[Figure]:
         bench.now_s += 0.07
         return focus_um, bench.optics.render(bench.now_s)
 
-    model = calibrate([image_at(truth + off * per_px) for off in np.linspace(-4.0, 4.0, 12)])
+    # Beyond its travel the lens stands at its end, wherever it was sent.
+    travel = bench.optics.settings.views["microscope"]
+    low, high = travel.focus_low_um, travel.focus_high_um
+    places = np.clip(truth + np.linspace(-4.0, 4.0, 12) * per_px, low, high)
+    model = calibrate([image_at(place) for place in np.unique(places).tolist()])
     rng = np.random.default_rng(11)
     inside, refused, errors = 0, 0, []
     for _ in range(runs):
-        start = truth + rng.uniform(-5.0, 5.0) * per_px
+        start = min(max(truth + rng.uniform(-5.0, 5.0) * per_px, low), high)
+        onward = 2.0 * per_px
+        other = start + onward if start + onward <= high else start - onward
         try:
-            found = in_focus(image_at(start), image_at(start + 2.0 * per_px), model)
+            found = in_focus(image_at(start), image_at(other), model)
         except CosmicError:
             refused += 1
             continue
