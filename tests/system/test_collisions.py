@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 import cosmic
+from cosmic.autonomy.handling.standing import standing_on_plate
 from cosmic.frame.clock import WALL
 from cosmic.mico.core.collision.callback import CollisionCallbackBase, Response
 from cosmic.mico.core.collision.helper_link import GateProcess
@@ -73,6 +74,12 @@ def test_a_grasp_may_touch_the_plate_but_not_the_clip_on_it(rig: cosmic.Rig) -> 
         assert rig.mico.check(down).allowed
         rig.mico.move(down)
         assert not rig.mico.check({"table.rotation": 154.8}).allowed, "nor may it turn into a jaw"
+
+
+def test_what_stands_on_the_plate_is_told_by_its_outline(rig: cosmic.Rig) -> None:
+    (clip,) = standing_on_plate(rig.mico)
+    assert clip.min(axis=0) == pytest.approx([10e3, -4e3])
+    assert clip.max(axis=0) == pytest.approx([12e3, 4e3])
 
 
 def test_a_cold_platform_initialises_without_a_refusal(caplog: pytest.LogCaptureFixture) -> None:
