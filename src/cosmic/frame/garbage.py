@@ -38,7 +38,8 @@ WORTHWHILE: Final = 5_000
 MOST: Final = 20_000
 """So many are looked through at once, whatever moves; it takes about 10 ms."""
 LONGEST_S: Final = 60.0
-"""So often at least, for a few objects can hold many megabytes."""
+"""So often at least, for a few objects can hold many megabytes. What a closed platform leaves waits
+no longer for a long rest where another one is at work all the time: a short one will do."""
 YOUNG: Final = 700
 """So many young objects are worth a look of the window's thread."""
 PASSES: Final = 10
@@ -96,6 +97,7 @@ class Garbage:
         self._moved_s = 0.0
         self._collected_s = 0.0
         self._left_behind = False
+        self._left_s = 0.0
 
     @property
     def in_force(self) -> bool:
@@ -143,6 +145,8 @@ class Garbage:
             if self._users.pop(number, None) is None:
                 return
             # A platform is freed by a whole collection only: much of it was frozen with the rest.
+            if self._users:
+                self._left_s = self._left_s if self._left_behind else self._now_s()
             self._left_behind = bool(self._users)
             if self._users:
                 return
@@ -163,9 +167,11 @@ class Garbage:
             if any(moves() for moves in list(self._users.values())):
                 self._moved_s = now_s
             rest_s = now_s - self._moved_s
+            waited = self._left_behind and now_s - self._left_s >= LONGEST_S
+            long_rest = rest_s >= (REST_S if waited else LONG_REST_S)
             many = self._grown >= MANY_FROZEN or self._left_behind
-            if self._grown >= MOST_FROZEN or (many and rest_s >= LONG_REST_S):
-                return self._collect(at_rest=rest_s >= LONG_REST_S, whole=True)
+            if self._grown >= MOST_FROZEN or (many and long_rest):
+                return self._collect(at_rest=long_rest, whole=True)
             passes = gc.get_count()[2]  # of young objects, since old ones were looked through
             grown = len(gc.get_objects(generation=2)) if passes else 0
             long_ago = now_s - self._collected_s >= LONGEST_S

@@ -74,6 +74,23 @@ def test_what_a_closed_platform_leaves_is_freed_at_the_next_long_rest(bench: Ben
     assert bench.after(LONG_REST_S) is None
 
 
+def test_what_a_closed_platform_leaves_waits_a_minute_for_a_long_rest_and_then_takes_a_short_one(
+    bench: Bench,
+) -> None:
+    kept, found = old_ring(10)
+    end = bench.garbage.begin(lambda: False)
+    kept.clear()
+    end()
+    for _ in range(int(LONGEST_S)):  # another platform is at work, and rests for a second at most
+        bench.moves = True
+        assert bench.garbage.tick() is None
+        bench.moves = False
+        assert found() is not None
+        done = bench.after(1.0)
+    assert done is not None and done.whole and done.at_rest
+    assert found() is None
+
+
 def test_nothing_old_is_looked_through_while_something_moves(bench: Bench) -> None:
     kept, found = old_ring(WORTHWHILE)
     kept.clear()
