@@ -156,7 +156,13 @@ def test_the_probe_points_at_the_operator_at_the_height_of_its_shaft() -> None:
 def test_the_table_turns_the_plate_about_the_origin() -> None:
     plate = corners("plate", {"table.rotation": 45.0})
     assert plate[:, :2].max() == pytest.approx(12000.0 * np.sqrt(2.0))
-    assert corners("plate", {})[:, 2].max() == pytest.approx(200.0)
+    assert corners("plate", {})[:, 2].max() == pytest.approx(0.0)
+
+
+def test_the_clip_turns_with_the_plate_and_stands_up_from_it() -> None:
+    clip = corners("plate_clip", {"table.rotation": 90.0})
+    assert clip.min(axis=0) == pytest.approx([-4000.0, 10_000.0, 0.0])
+    assert clip.max(axis=0) == pytest.approx([4000.0, 12_000.0, 200.0])
 
 
 def test_the_region_of_work_is_free_for_every_pair() -> None:
@@ -204,7 +210,7 @@ def test_over_all_travel_only_the_dangers_that_are_meant_can_meet() -> None:
         for side in ("left", "right")
         for part in ("jaw_a", "jaw_b", "gripper", "arm")
     ]
-    dangers = {"plate", "table", "probe_chip", "probe_tip"}
+    dangers = {"plate", "plate_clip", "table", "probe_chip", "probe_tip"}
     for one, other in pairs_that_can_meet({a: scene().travel(a) for a in scene().axes}, 5.0):
         hand, thing = (one, other) if one in hands else (other, one)
         assert hand in hands, (one, other)
