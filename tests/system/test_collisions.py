@@ -76,7 +76,7 @@ def test_a_grasp_may_touch_the_plate_but_not_the_clip_on_it(rig: cosmic.Rig) -> 
         assert not rig.mico.check({"table.rotation": 154.8}).allowed, "nor may it turn into a jaw"
 
 
-def test_what_stands_on_the_plate_is_told_by_its_outline(rig: cosmic.Rig) -> None:
+def test_what_stands_on_the_plate_is_known_by_its_outline(rig: cosmic.Rig) -> None:
     (clip,) = standing_on_plate(rig.mico)
     assert clip.min(axis=0) == pytest.approx([10e3, -4e3])
     assert clip.max(axis=0) == pytest.approx([12e3, 4e3])

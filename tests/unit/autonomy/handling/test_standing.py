@@ -141,7 +141,7 @@ def test_where_the_clip_is_in_the_way_of_the_map_the_table_turns_on(
     assert done == ["map", "turn", "map", "turn", "map"]
 
 
-def test_what_is_in_the_way_at_every_angle_is_told(
+def test_what_is_in_the_way_at_every_angle_is_reported(
     monkeypatch: pytest.MonkeyPatch, tried: Callable[..., list[str]]
 ) -> None:
     done = tried(*[refused(Reason.COLLISION)] * 9)
