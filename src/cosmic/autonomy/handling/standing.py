@@ -6,6 +6,7 @@ from typing import Final
 import cv2
 import numpy as np
 
+from cosmic.frame.errors import NotAvailable
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.collision.kinematics import body_poses
 from cosmic.mico.core.collision.model import JointKind, SceneModel
@@ -20,10 +21,18 @@ def standing_on_plate(mico: Mico) -> tuple[Floats, ...]:
 
     They are convex, and in the frame of the plate. Empty where the scene names no plate, or there
     is none.
+
+    Raises
+    ------
+    CosmicError
+        The station of the axes does not answer.
     """
     if not mico.checks_collisions:
         return ()
-    scene = mico.collision.scene
+    try:
+        scene = mico.collision.scene
+    except NotAvailable:  # that of a station, which is on its way
+        scene = mico.scene()
     poses = body_poses(scene, scene.joint_values({}))
     found = []
     for piece in scene.pieces:
