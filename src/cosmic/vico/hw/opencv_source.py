@@ -169,7 +169,9 @@ def open_film(source: VideoSource) -> Film:
 
 
 def _decoded(path: Path) -> Raw | None:
-    image: Any = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    # OpenCV itself opens no path with other letters than ASCII on Windows.
+    data = np.fromfile(path, np.uint8)
+    image: Any = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     known = image is not None and image.dtype in (np.uint8, np.uint16)
     return image if known else None
 

@@ -1,6 +1,7 @@
 """What stands on the plate is kept clear of: in the bin, and where the plate's map is measured."""
 
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,13 +13,17 @@ from cosmic.autonomy.handling import prepare
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.prepare import CalibratePlate, TurnOn
 from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.handling.standing import standing_on_plate
 from cosmic.autonomy.procedures.operation import Steps
 from cosmic.frame.clock import ManualClock
-from cosmic.frame.errors import MoveRefused
+from cosmic.frame.errors import MoveRefused, NotAvailable
 from cosmic.frame.verdict import MoveVerdict, Reason
+from cosmic.mico.core.collision.model import SceneModel
+from cosmic.mico.core.collision.scene_loader import load_scene
 from cosmic.vico.core.tool_settings import ToolSettings
 
 CLIP = np.array([[10e3, -4e3], [12e3, -4e3], [12e3, 4e3], [10e3, 4e3]])
+SCENE = Path(__file__).resolve().parents[4] / "config" / "scenes" / "fiberstation.toml"
 SIDES = {"left": 1.0, "right": -1.0}
 
 
@@ -49,6 +54,27 @@ class Bench(HandlingContext):
             forward=(SIDES[name], 0.0),
             width_um=100.0,
         )
+
+
+def test_the_scene_of_a_station_is_asked_for_where_it_has_not_come_yet() -> None:
+    here = load_scene(SCENE)
+
+    class Far:
+        checks_collisions = True
+
+        @property
+        def collision(self) -> Any:
+            raise NotAvailable("the scene of the station has not arrived yet")
+
+        def scene(self) -> SceneModel:
+            return here
+
+    far: Any = Far()
+    (clip,) = standing_on_plate(far)
+    assert clip.min(axis=0) == pytest.approx(CLIP.min(axis=0))
+    assert clip.max(axis=0) == pytest.approx(CLIP.max(axis=0))
+    far.checks_collisions = False
+    assert standing_on_plate(far) == ()
 
 
 @pytest.mark.parametrize("gripper", ["left", "right"])
