@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 import cosmic
-from cosmic.autonomy.handling.standing import standing_on_plate
+from cosmic.autonomy.handling.plate_obstacles import plate_obstacles
 from cosmic.frame.clock import WALL
 from cosmic.mico.core.collision.callback import CollisionCallbackBase, Response
 from cosmic.mico.core.collision.helper_link import GateProcess
@@ -77,7 +77,7 @@ def test_a_grasp_may_touch_the_plate_but_not_the_clip_on_it(rig: cosmic.Rig) -> 
 
 
 def test_what_stands_on_the_plate_is_known_by_its_outline(rig: cosmic.Rig) -> None:
-    (clip,) = standing_on_plate(rig.mico)
+    (clip,) = plate_obstacles(rig.mico)
     assert clip.min(axis=0) == pytest.approx([10e3, -4e3])
     assert clip.max(axis=0) == pytest.approx([12e3, 4e3])
 

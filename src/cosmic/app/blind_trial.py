@@ -324,14 +324,14 @@ def table_of(results: Sequence[TrialResult]) -> list[str]:
         lines.append(f"{'fibre':>5} {'true':>10} {'measured':>10} {'95 % interval':>23} {'':<12}")
         lines += [_line(row) for row in rows]
     good = [row for row in rows if row.measured.trusted]
+    lines.append(f"measured {len(rows)}, good {len(good)}")
+    if not good:
+        return [*lines, "no value is good: there is nothing to compare"]
     inside = sum(row.inside for row in good)
     off = sum(row.off_by_twice for row in good)
     right = [row for row in rows if row.inside and row.measured.half_percent <= 30.0]
     thrown = sum(not row.measured.trusted for row in right)
     halves = [row.measured.half_percent for row in good]
-    lines.append(f"measured {len(rows)}, good {len(good)}")
-    if not good:
-        return [*lines, "no value is good: there is nothing to compare"]
     part = inside / len(good)
     error = 196.0 * math.sqrt(max(part * (1.0 - part), 0.02) / len(good))
     lines += [

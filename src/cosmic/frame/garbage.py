@@ -96,8 +96,7 @@ class Garbage:
         self._grown = 0  # what was frozen since the start; to count takes many milliseconds
         self._moved_s = 0.0
         self._collected_s = 0.0
-        self._left_behind = False
-        self._left_s = 0.0
+        self._left_s: float | None = None  # since when a closed platform waits to be freed
 
     @property
     def in_force(self) -> bool:
@@ -146,10 +145,9 @@ class Garbage:
                 return
             # A platform is freed by a whole collection only: much of it was frozen with the rest.
             if self._users:
-                self._left_s = self._left_s if self._left_behind else self._now_s()
-            self._left_behind = bool(self._users)
-            if self._users:
+                self._left_s = self._now_s() if self._left_s is None else self._left_s
                 return
+            self._left_s = None
             if gc.get_threshold() == (*self._before[:2], NEVER):  # else somebody else's wish
                 gc.set_threshold(*self._before)
             if not self._frozen_before:  # what a script froze before stays so
@@ -167,9 +165,9 @@ class Garbage:
             if any(moves() for moves in list(self._users.values())):
                 self._moved_s = now_s
             rest_s = now_s - self._moved_s
-            waited = self._left_behind and now_s - self._left_s >= LONGEST_S
-            long_rest = rest_s >= (REST_S if waited else LONG_REST_S)
-            many = self._grown >= MANY_FROZEN or self._left_behind
+            waits_s = -1.0 if self._left_s is None else now_s - self._left_s
+            long_rest = rest_s >= (REST_S if waits_s >= LONGEST_S else LONG_REST_S)
+            many = self._grown >= MANY_FROZEN or waits_s >= 0.0
             if self._grown >= MOST_FROZEN or (many and long_rest):
                 return self._collect(at_rest=long_rest, whole=True)
             passes = gc.get_count()[2]  # of young objects, since old ones were looked through
@@ -208,7 +206,7 @@ class Garbage:
         left = gc.get_freeze_count()
         self._grown = 0 if whole else self._grown + left - before
         if whole:
-            self._left_behind = False
+            self._left_s = None
         objects = found + (left if whole else left - before)
         done = Collection(objects, found, self._collected_s - began_s, at_rest, whole)
         level = logging.INFO if not at_rest and done.took_s > 0.02 else logging.DEBUG

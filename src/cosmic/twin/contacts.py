@@ -60,6 +60,7 @@ class Contacts:
         self._slides: list[Slide] = []
         self._corners: list[Floats] = []
         self._boxes: list[tuple[str, Floats]] = []
+        self._still = dict.fromkeys(self._stage_names, 0.0)
         self._read(folder / settings.geometry.urdf)
         self._low = np.array([each.min(axis=0) for each in self._corners])
         self._high = np.array([each.max(axis=0) for each in self._corners])
@@ -163,12 +164,12 @@ class Contacts:
 
     def _read(self, path: Path) -> None:
         skeleton = self._skeleton
-        turning, still = skeleton.turning, dict.fromkeys(self._stage_names, 0.0)
+        turning, still = skeleton.turning, self._still
         from_world = np.linalg.inv(skeleton.pose(self._plate, still))
         solids = read_solids(path, ())
         bottom = min(float(each[:, 2].min()) for each in solids[self._plate])
         for link, parts in solids.items():
-            if skeleton.on(link, self._plate):
+            if skeleton.is_firm_on(link, self._plate):
                 pose = from_world @ skeleton.pose(link, still)
                 for part in parts:
                     placed = part @ pose[:3, :3].T + pose[:3, 3]
@@ -256,9 +257,7 @@ class Contacts:
 
     def _highest_um(self) -> float:
         """Return the height of the highest thing on the plate."""
-        position = float(
-            self._skeleton.pose(self._plate, dict.fromkeys(self._stage_names, 0.0))[2, 3]
-        )
+        position = float(self._skeleton.pose(self._plate, self._still)[2, 3])
         return max(float(box[1, 2]) for _, box in self._boxes) + position
 
     def _on_plate(

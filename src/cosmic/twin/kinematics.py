@@ -125,7 +125,7 @@ class Skeleton:
         """Whether a link is the one that all joints start from."""
         return link not in self._joint_of
 
-    def on(self, link: str, other: str) -> bool:
+    def is_firm_on(self, link: str, other: str) -> bool:
         """Whether a link is another one, or is firmly joined to it."""
         while link != other:
             joint = self._joint_of.get(link)

@@ -91,6 +91,20 @@ def test_what_a_closed_platform_leaves_waits_a_minute_for_a_long_rest_and_then_t
     assert found() is None
 
 
+def test_platforms_that_are_closed_one_after_the_other_do_not_put_that_off(bench: Bench) -> None:
+    kept, found = old_ring(10)
+    end = bench.garbage.begin(lambda: False)
+    kept.clear()
+    end()
+    for _ in range(3):
+        bench.moves = True
+        assert bench.after(LONGEST_S / 2.0) is None
+        bench.garbage.begin(lambda: False)()
+    bench.moves = False
+    bench.after(1.0)
+    assert found() is None
+
+
 def test_nothing_old_is_looked_through_while_something_moves(bench: Bench) -> None:
     kept, found = old_ring(WORTHWHILE)
     kept.clear()

@@ -259,6 +259,31 @@ def test_a_body_that_may_touch_everything_is_warned_of(tmp_path: Path) -> None:
     assert "'table' may touch everything it can meet" in text
 
 
+CLIP = """<collision>
+    <origin xyz="0.018 0 0.001"/><geometry><box size="0.002 0.002 0.0004"/></geometry></collision>
+  </link>"""
+GRASP = """
+[[contact]]
+operation = "grasp"
+pairs = [["slider", "table"]]
+reason = "it takes things up"
+"""
+
+
+def test_a_plate_that_may_be_touched_with_what_stands_on_it_is_warned_of(tmp_path: Path) -> None:
+    end = '<cylinder radius="0.003" length="0.002"/></geometry></collision>\n  </link>'
+    clipped = {end: end.replace("\n  </link>", CLIP)}
+    plate = {"margin_um = 5.0": 'margin_um = 5.0\nplate = "table"'}
+
+    text = warnings(write_scene(tmp_path, urdf=clipped, toml=plate, more=GRASP))
+
+    assert "contact 'grasp' lets bodies run into all of 'table'" in text
+    assert "differ in height by 200 um" in text
+    assert "link of its own" in text
+    assert not warnings(write_scene(tmp_path, urdf=clipped, toml=plate))
+    assert not warnings(write_scene(tmp_path, toml=plate, more=GRASP))
+
+
 def test_a_joint_without_a_drive_is_warned_of(tmp_path: Path) -> None:
     toml = {'\n[[drive]]\naxis = "spin"\njoint = "turn"\n': ""}
     assert "joint 'turn' has no [[drive]]" in warnings(write_scene(tmp_path, toml=toml))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 import numpy as np
+import numpy.typing as npt
 from typing_extensions import override
 
 from cosmic.daqco.api.daqco import Daqco
@@ -26,6 +27,38 @@ class Sample:
 
     value: float
     read_wall_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Between which a measurement must lie while a loop runs.
+
+    Raises
+    ------
+    ConfigError
+        The low one does not lie below the high one.
+    """
+
+    name: str
+    unit: str
+    low: float = -math.inf
+    high: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Refuse limits between which nothing lies."""
+        if not self.low < self.high:
+            raise ConfigError(f"{self.name}: the low limit must lie below the high one")
+
+    def crossed(self, values: npt.ArrayLike) -> LimitError | None:
+        """Return what says that the first value beyond them does; None where none does."""
+        given = np.atleast_1d(np.asarray(values, dtype=np.float64))
+        beyond = given[~((given > self.low) & (given < self.high))]
+        if not beyond.size:
+            return None
+        value = float(beyond[0])
+        limit = self.low if value <= self.low else self.high
+        text = f"{self.name} reached {value:.4g} {self.unit}, the loop's limit is {limit:g}"
+        return LimitError(refuse(Reason.LIMIT, text, value=value, limit=limit, unit=self.unit))
 
 
 class Source(Protocol):
@@ -87,13 +120,11 @@ class ChannelSource(Source):
             raise ConfigError(
                 f"there is no active channel {channel!r}; there are {', '.join(daqco.channels)}"
             )
-        if not low < high:
-            raise ConfigError(f"{channel}: the low limit must lie below the high one")
         self._daqco = daqco
         self._channel = channel
         self._unit = daqco.units[channel]
         self._stale_s, self._pause_s = stale_s, min(pause_s, stale_s)
-        self._low, self._high = low, high
+        self._limits = Limits(channel, self._unit, low, high)
         self._newest: Sample | None = None
         self._on_limit: Callable[[CosmicError], None] | None = None
         self._forget: Callable[[], None] | None = None
@@ -148,20 +179,12 @@ class ChannelSource(Source):
             return
         values = chunk.scales[row].apply(chunk.volts[row])
         self._newest = Sample(float(values[-1]), WALL.now_s())
-        beyond = np.flatnonzero(~((values > self._low) & (values < self._high)))
-        if beyond.size:
-            self._report(_crossed(self, float(values[beyond[0]]), (self._low, self._high)))
+        if (crossed := self._limits.crossed(values)) is not None:
+            self._report(crossed)
 
     def _report(self, error: CosmicError) -> None:
         if self._on_limit is not None:
             self._on_limit(error)
-
-
-def _crossed(source: Source, value: float, limits: tuple[float, float]) -> LimitError:
-    low, high = limits
-    limit = low if value <= low else high
-    text = f"{source.name} reached {value:.4g} {source.unit}, the loop's limit is {limit:g}"
-    return LimitError(refuse(Reason.LIMIT, text, value=value, limit=limit, unit=source.unit))
 
 
 class PositionSource(Source):
@@ -182,12 +205,10 @@ class PositionSource(Source):
         low: float = -math.inf,
         high: float = math.inf,
     ) -> None:
-        if not low < high:
-            raise ConfigError(f"{axis}: the low limit must lie below the high one")
         self._axis = mico[axis]
+        self._limits = Limits(self._axis.key, self._axis.unit, low, high)
         settings = mico.settings.watch
         self._stale_s = max(stale_s, IDLE_POLLS * settings.idle_poll_s)
-        self._low, self._high = low, high
         self._on_limit: Callable[[CosmicError], None] | None = None
 
     @property
@@ -220,8 +241,9 @@ class PositionSource(Source):
         state = self._axis.details
         if state.position is None:
             return None
-        if not self._low < state.position < self._high and self._on_limit is not None:
-            self._on_limit(_crossed(self, state.position, (self._low, self._high)))
+        crossed = self._limits.crossed(state.position)
+        if crossed is not None and self._on_limit is not None:
+            self._on_limit(crossed)
         return Sample(state.position, state.read_wall_s)
 
     @override

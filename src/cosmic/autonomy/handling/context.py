@@ -13,10 +13,10 @@ from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.autonomy.handling.force import ForceWatch
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Jaws, PlateFrame
+from cosmic.autonomy.handling.plate_obstacles import plate_obstacles
 from cosmic.autonomy.handling.retrying_move import RetryingMove, return_movement
 from cosmic.autonomy.handling.settings import HandlingSettings, of_arm
 from cosmic.autonomy.handling.sight import LastSeen, LiveImage, map_at
-from cosmic.autonomy.handling.standing import standing_on_plate
 from cosmic.autonomy.procedures.failures import failure_of
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps, UnitOperation
 from cosmic.autonomy.procedures.waits import Resource
@@ -79,8 +79,8 @@ class SharedWorkspace:
         Grippers that have begun with a fibre, whether they have chosen it yet or not.
     parks_limit : bool
         The force limit is armed only while the probe is out.
-    standing_um : tuple of ndarray, shape (n, 2)
-        Outlines of what stands on the plate, in its frame.
+    obstacles_um : tuple of ndarray, shape (n, 2)
+        Corners of what stands on the plate, in its frame.
     enough : callable
         Says whether no further fibre is to be begun, for a procedure that treats many.
     """
@@ -108,7 +108,7 @@ class SharedWorkspace:
     arms: "dict[str, HandlingContext]" = field(default_factory=dict)
     seeking: set[str] = field(default_factory=set)
     parks_limit: bool = False
-    standing_um: tuple[Floats, ...] = ()
+    obstacles_um: tuple[Floats, ...] = ()
     enough: Callable[[], bool] = _never
 
     def done_with(self, fibre: HeldFibre) -> None:
@@ -250,7 +250,7 @@ class HandlingContext:
         for name in (settings.gripper, settings.probe, *filter(None, [settings.other])):
             work.tool(name)
         rig.vico.camera(settings.camera)
-        work.shared.standing_um = standing_on_plate(rig.mico)
+        work.shared.obstacles_um = plate_obstacles(rig.mico)
         if isinstance(positions := work.vision.transform, PlatformTransform):
             work.calibration.registry = positions.registry
         forces.open()
@@ -352,16 +352,16 @@ class HandlingContext:
         return targets
 
     def bin_position(self, z_um: float | None = None) -> dict[str, float]:
-        """Return where the gripper's axes stand above the bin, beside what stands there."""
+        """Return where the gripper's axes stand above the bin, beside obstacles on the plate."""
         positions, jaws = self.settings.places, self.jaws
         x, y = positions.bin_x_um * jaws.forward, positions.bin_y_um
-        if self.shared.standing_um:
+        if self.shared.obstacles_um:
             frame, angle = self.calibration.frame, self.table_deg
-            standing = [frame.on_platform(each, angle) for each in self.shared.standing_um]
+            obstacles = [frame.on_platform(each, angle) for each in self.shared.obstacles_um]
             free = (
                 aside
                 for aside in (y, y - BIN_ASIDE_UM, y + BIN_ASIDE_UM)
-                if not jaws.over(standing, (x, aside), self.settings.grasp)
+                if not jaws.cover(obstacles, (x, aside), self.settings.grasp)
             )
             y = next(free, y)
         return self.at(self.gripper, x, y, z_um)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from cosmic.autonomy.handling.plate_obstacles import ROOM_UM, any_under
 from cosmic.autonomy.handling.settings import GraspSettings
-from cosmic.autonomy.handling.standing import ROOM_UM, any_under
 from cosmic.vico.core.pixel_map import Floats
 
 
@@ -108,21 +108,21 @@ class Jaws:
     length_um: float = 6000.0
     half_um: float = 260.0
 
-    def over(
-        self, standing_um: Sequence[Floats], tip_um: tuple[float, float], settings: GraspSettings
+    def cover(
+        self, obstacles_um: Sequence[Floats], tip_um: tuple[float, float], settings: GraspSettings
     ) -> bool:
-        """Return whether the jaws come over what stands on the plate, however far they are open.
+        """Return whether the jaws cover an obstacle on the plate, however far they are open.
 
         Parameters
         ----------
-        standing_um : sequence of ndarray, shape (n, 2)
-            Outlines of it, on the platform.
+        obstacles_um : sequence of ndarray, shape (n, 2)
+            Corners of convex ones, on the platform.
         """
         aside = self.half_um + 0.5 * (settings.full_um - settings.gap_um) + ROOM_UM
         ahead, behind = self.forward * ROOM_UM, -self.forward * (self.length_um + ROOM_UM)
         x, y = tip_um
         corners = np.array([[x + ahead, y - aside], [x + behind, y + aside]])
-        return any_under(standing_um, corners.min(axis=0), corners.max(axis=0))
+        return any_under(obstacles_um, corners.min(axis=0), corners.max(axis=0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,12 +133,12 @@ class Neighbours:
     ----------
     lines_um : sequence of ndarray, shape (n, 2)
         Fibres.
-    standing_um : sequence of ndarray, shape (n, 2)
-        Convex outlines of what stands on it, such as a clip.
+    obstacles_um : sequence of ndarray, shape (n, 2)
+        Corners of what stands on it, such as a clip.
     """
 
     lines_um: Sequence[Floats] = field(default_factory=tuple)
-    standing_um: Sequence[Floats] = field(default_factory=tuple)
+    obstacles_um: Sequence[Floats] = field(default_factory=tuple)
 
 
 def reaches(
@@ -157,8 +157,8 @@ def reaches(
         turned = frame.on_platform(line, angle)
         tip = along(turned, settings.inside_um)
         reach = Reach(candidate, angle, turned, (float(tip[0]), float(tip[1])))
-        standing = [frame.on_platform(each, angle) for each in others.standing_um]
-        if not _in_reach(reach, jaws, settings) or jaws.over(standing, reach.tip_um, settings):
+        obstacles = [frame.on_platform(each, angle) for each in others.obstacles_um]
+        if not _in_reach(reach, jaws, settings) or jaws.cover(obstacles, reach.tip_um, settings):
             continue
         under = _under(reach, frame, jaws, settings, others)
         if under is not None:

@@ -258,12 +258,12 @@ class CalibratePlate(Calibrated):
     @override
     def measure(self, work: HandlingContext) -> Steps:
         position = work.settings.calibration
-        residual = yield from self._clear_of_standing(work)
+        residual = yield from self._clear_of_obstacles(work)
         self.kept(work, residual, "px", position.residual_px)
         work.calibration.zoom_run = work.shared.zoom_runs
 
     @staticmethod
-    def _clear_of_standing(work: HandlingContext) -> Generator[Yielded, object, float]:
+    def _clear_of_obstacles(work: HandlingContext) -> Generator[Yielded, object, float]:
         """Take the gripper about just above the plate, with its clip out of the way."""
         position = work.settings.calibration
         x, y, z = position.place_x_um, position.place_y_um, position.place_um

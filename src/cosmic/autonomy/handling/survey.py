@@ -340,7 +340,7 @@ def approaches_of(work: HandlingContext, candidate: Candidate, angle_deg: float)
         work.calibration.frame,
         work.jaws,
         work.settings.grasp,
-        Neighbours(others, work.shared.standing_um),
+        Neighbours(others, work.shared.obstacles_um),
         angle_deg,
     )
 

@@ -101,7 +101,7 @@ def test_no_path_leads_the_jaws_over_what_stands_on_the_plate(forward: float) ->
                     PlateFrame(),
                     jaws,
                     settings,
-                    Neighbours(standing_um=clip),
+                    Neighbours(obstacles_um=clip),
                     0.0,
                 )
                 free, kept = (free, kept + len(ways)) if clip else (free + len(ways), kept)

@@ -12,6 +12,7 @@ from cosmic.mico.core.collision.scene_settings import SceneSettings
 from cosmic.mico.core.collision.scene_solid import close_pairs, placed_corners
 
 MANY_TRIANGLES: Final = 30000
+STANDS_UP_UM: Final = 10.0
 _ROUNDING: Final = 1e-9
 
 
@@ -22,6 +23,7 @@ def check_model(model: SceneModel, settings: SceneSettings, path: Path, findings
     _check_travel(model, path, findings)
     for key, positions in (("park", model.park), ("detour", model.detour_height)):
         _check_positions(model, key, positions, path, findings)
+    _check_contacts(model, path, findings)
     triangles = sum(len(view.faces) for view in model.views)
     if triangles > MANY_TRIANGLES:
         findings.odd(
@@ -62,6 +64,22 @@ def _check_sizes(
                 path,
                 f"link {piece.body!r} reaches {far / 1e6:.6g} m from the origin; is an <origin> in "
                 "millimetres? Else raise limits.scene_radius_um",
+            )
+
+
+def _check_contacts(model: SceneModel, path: Path, findings: Findings) -> None:
+    """Warn of a plate that may be touched with all that stands on it."""
+    places = zip(model.pieces, placed_corners(model, {}), strict=True)
+    tops = [float(corners[:, 2].max()) for piece, corners in places if piece.body == model.plate]
+    if not tops or np.ptp(tops) <= STANDS_UP_UM:
+        return
+    for contact in model.contacts:
+        if any(model.plate in pair for pair in contact.pairs):
+            findings.odd(
+                path,
+                f"contact {contact.name!r} lets bodies run into all of {model.plate!r}, parts of "
+                f"which differ in height by {np.ptp(tops):.0f} um; make a link of its own of what "
+                "must never be touched, such as a clip",
             )
 
 

@@ -11,9 +11,9 @@ from typing_extensions import override
 
 from cosmic.autonomy.handling import prepare
 from cosmic.autonomy.handling.context import HandlingContext
+from cosmic.autonomy.handling.plate_obstacles import any_under, plate_obstacles
 from cosmic.autonomy.handling.prepare import CalibratePlate, TurnOn
 from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.handling.standing import standing_on_plate
 from cosmic.autonomy.procedures.operation import Steps
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import MoveRefused, NotAvailable
@@ -34,7 +34,7 @@ class Bench(HandlingContext):
         none: Any = None
         settings = HandlingSettings(gripper=gripper)  # type: ignore[arg-type]
         super().__init__(none, none, none, settings, ManualClock(), none)
-        self.shared.standing_um = (CLIP,)
+        self.shared.obstacles_um = (CLIP,)
         self.angle_deg = table_deg
 
     @property
@@ -70,11 +70,11 @@ def test_the_scene_of_a_station_is_asked_for_where_it_has_not_come_yet() -> None
             return here
 
     far: Any = Far()
-    (clip,) = standing_on_plate(far)
+    (clip,) = plate_obstacles(far)
     assert clip.min(axis=0) == pytest.approx(CLIP.min(axis=0))
     assert clip.max(axis=0) == pytest.approx(CLIP.max(axis=0))
     far.checks_collisions = False
-    assert standing_on_plate(far) == ()
+    assert plate_obstacles(far) == ()
 
 
 @pytest.mark.parametrize("gripper", ["left", "right"])
@@ -93,6 +93,15 @@ def test_nothing_is_put_away_where_the_clip_stands(gripper: str, table_deg: floa
     ahead, aside = off[:, 0] * SIDES[gripper], np.abs(off[:, 1])
     assert not ((ahead < 0.0) & (ahead > -6000.0) & (aside < 600.0)).any()
     assert abs(there[f"{gripper}.y"]) <= 5000.0
+
+
+def test_an_obstacle_that_stands_askew_beside_the_corner_is_not_below() -> None:
+    askew = np.array([[0.0, 100.0], [100.0, 0.0], [200.0, 100.0], [100.0, 200.0]])
+    low = np.array([-100.0, -100.0])
+    assert not any_under([askew], low, np.array([40.0, 40.0])), "their boxes overlap, not they"
+    assert any_under([askew], low, np.array([60.0, 60.0]))
+    assert any_under([askew], low, np.array([300.0, 300.0])), "all of it"
+    assert any_under([askew], np.array([90.0, 90.0]), np.array([110.0, 110.0])), "in its middle"
 
 
 def test_where_the_bin_is_clear_it_stays_where_it_is_set() -> None:

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import Final
 
-import cv2
 import numpy as np
 
 from cosmic.frame.errors import NotAvailable
@@ -16,11 +15,11 @@ ROOM_UM: Final = 300.0
 """Jaws keep off by so much: a fibre is tested, shaken and wiped off some way beside its place."""
 
 
-def standing_on_plate(mico: Mico) -> tuple[Floats, ...]:
-    """Return the outline from above of all that stands on the plate, each of shape (n, 2), um.
+def plate_obstacles(mico: Mico) -> tuple[Floats, ...]:
+    """Return the corners, from above, of all that stands on the plate, each of shape (n, 2), um.
 
-    They are convex, and in the frame of the plate. Empty where the scene names no plate, or there
-    is none.
+    Each is convex, and in the frame of the plate. Empty where the scene names no plate, or there is
+    none.
 
     Raises
     ------
@@ -34,17 +33,16 @@ def standing_on_plate(mico: Mico) -> tuple[Floats, ...]:
     except NotAvailable:  # that of a station, which is on its way
         scene = mico.scene()
     poses = body_poses(scene, scene.joint_values({}))
-    found = []
-    for piece in scene.pieces:
-        if piece.body in _firm_on_plate(scene):
-            pose = poses[scene.body_number[piece.body]]
-            corners = piece.vertices_um @ pose[:2, :3].T + pose[:2, 3]
-            hull = cv2.convexHull(corners.astype(np.float32))
-            found.append(np.asarray(hull[:, 0], dtype=np.float64))
-    return tuple(found)
+    standing = _bodies_on_plate(scene)
+    return tuple(
+        np.unique(piece.vertices_um @ pose[:2, :3].T + pose[:2, 3], axis=0)
+        for piece in scene.pieces
+        if piece.body in standing
+        for pose in (poses[scene.body_number[piece.body]],)
+    )
 
 
-def _firm_on_plate(scene: SceneModel) -> set[str]:
+def _bodies_on_plate(scene: SceneModel) -> set[str]:
     """Return the bodies that are firmly joined to the plate, without itself."""
     firm = {scene.plate}
     for joint in scene.joints:  # parents come before their children
@@ -53,24 +51,25 @@ def _firm_on_plate(scene: SceneModel) -> set[str]:
     return firm - {scene.plate}
 
 
-def any_under(outlines_um: Sequence[Floats], low_um: Floats, high_um: Floats) -> bool:
-    """Return whether something lies under a rectangle along x and y.
+def any_under(obstacles_um: Sequence[Floats], low_um: Floats, high_um: Floats) -> bool:
+    """Return whether an obstacle lies under a rectangle along x and y.
 
     Parameters
     ----------
-    outlines_um : sequence of ndarray, shape (n, 2)
-        Convex, on the platform.
+    obstacles_um : sequence of ndarray, shape (n, 2)
+        Corners of convex ones, on the platform.
     low_um, high_um : ndarray, shape (2,)
         Corners of the rectangle.
     """
     corners = np.array([[x, y] for x in (low_um[0], high_um[0]) for y in (low_um[1], high_um[1])])
-    return any(_overlap(each, corners) for each in outlines_um)
+    return any(_overlap(each, corners) for each in obstacles_um)
 
 
-def _overlap(outline: Floats, corners: Floats) -> bool:
+def _overlap(obstacle: Floats, corners: Floats) -> bool:
     """Return whether two convex shapes overlap: no line along a side of one is between them."""
-    sides = np.roll(outline, -1, axis=0) - outline
-    across = np.concatenate([np.column_stack([-sides[:, 1], sides[:, 0]]), np.eye(2)])
-    one, other = outline @ across.T, corners @ across.T
+    # Among all lines through two corners are those along the sides.
+    between = (obstacle[:, None] - obstacle).reshape(-1, 2)
+    across = np.concatenate([np.column_stack([-between[:, 1], between[:, 0]]), np.eye(2)])
+    one, other = obstacle @ across.T, corners @ across.T
     apart = (one.max(axis=0) < other.min(axis=0)) | (other.max(axis=0) < one.min(axis=0))
     return not apart.any()
