@@ -77,13 +77,13 @@ class Near:
         return self.distance_um - self.margin_um
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Joint:
     name: str
     kind: str
     parent: str
     child: str
-    turn: Rotation
+    turn: np.ndarray
     origin: np.ndarray
     axis: np.ndarray
 
@@ -100,7 +100,7 @@ class PlatformClearance:
     def __init__(self, scene: Path) -> None:
         facts = tomllib.loads(scene.read_text(encoding="utf-8"))
         robot = ET.parse(scene.parent / facts["urdf"]).getroot()
-        self._joints = self._read_joints(robot)
+        self._joints = self._outwards(self._read_joints(robot))
         self._drives = [
             (each["axis"], each["joint"], float(each.get("factor", 1.0)), each.get("offset", 0.0))
             for each in facts["drive"]
@@ -116,6 +116,7 @@ class PlatformClearance:
                 assert geometry is not None
                 self._bodies.append(link.get("name", ""))
                 self._pieces.append(turn.apply(_points(geometry, scene.parent)) + origin)
+        self._begins = np.cumsum([0] + [len(points) for points in self._pieces[:-1]])
         self._read_pairs(facts, scene.parent)
         self._shared: dict[tuple[int, tuple[float, ...]], float] = {}
 
@@ -134,12 +135,24 @@ class PlatformClearance:
                     each.get("type", ""),
                     parent.get("link", ""),
                     child.get("link", ""),
-                    turn,
+                    turn.as_matrix(),
                     origin,
                     along / np.linalg.norm(along),
                 )
             )
         return joints
+
+    @staticmethod
+    def _outwards(joints: list[_Joint]) -> list[_Joint]:
+        """Return them so that each comes after the one that carries it."""
+        children = {joint.child for joint in joints}
+        known = {joint.parent for joint in joints} - children
+        found: list[_Joint] = []
+        while len(found) < len(joints):
+            joint = next(each for each in joints if each not in found and each.parent in known)
+            found.append(joint)
+            known.add(joint.child)
+        return found
 
     def _read_pairs(self, facts: Mapping[str, object], folder: Path) -> None:
         srdf = ET.parse(folder / str(facts["srdf"])).getroot()
@@ -189,32 +202,31 @@ class PlatformClearance:
 
         return {body: root(body) for body in bodies}
 
-    def _world(self, positions: Mapping[str, float]) -> list[np.ndarray]:
+    def _stands(self, positions: Mapping[str, float]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Return turn and origin of each body that hangs at a joint."""
         values: dict[str, float] = {}
         for axis, joint, factor, offset in self._drives:
             value = factor * positions[axis] + offset
             values[joint] = math.radians(value) if axis in self._rotary else value
-        children = {joint.child for joint in self._joints}
-        stands = {
-            joint.parent: (Rotation.identity(), np.zeros(3))
-            for joint in self._joints
-            if joint.parent not in children
-        }
-        left = list(self._joints)
-        while left:
-            joint = next(each for each in left if each.parent in stands)
-            left.remove(joint)
-            turn, origin = stands[joint.parent]
-            origin, turn = turn.apply(joint.origin) + origin, turn * joint.turn
+        still = (np.eye(3), np.zeros(3))
+        stands: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        for joint in self._joints:
+            turn, origin = stands.setdefault(joint.parent, still)
+            origin, turn = turn @ joint.origin + origin, turn @ joint.turn
             value = values.get(joint.name, 0.0)
-            if joint.kind == "prismatic":
-                origin = origin + turn.apply(value * joint.axis)
-            elif joint.kind != "fixed":
-                turn = turn * Rotation.from_rotvec(value * joint.axis)
+            if value and joint.kind == "prismatic":
+                origin = origin + turn @ (value * joint.axis)
+            elif value and joint.kind != "fixed":
+                turn = turn @ Rotation.from_rotvec(value * joint.axis).as_matrix()
             stands[joint.child] = (turn, origin)
+        return stands
+
+    def _world(self, positions: Mapping[str, float], *pieces: int) -> list[np.ndarray]:
+        """Return the corners of these pieces, of all with none."""
+        stands = self._stands(positions)
         return [
-            points @ stands[body][0].as_matrix().T + stands[body][1]
-            for body, points in zip(self._bodies, self._pieces, strict=True)
+            self._pieces[piece] @ stands[self._bodies[piece]][0].T + stands[self._bodies[piece]][1]
+            for piece in pieces or range(len(self._pieces))
         ]
 
     def nearest(self, positions: Mapping[str, float]) -> Near:
@@ -237,8 +249,9 @@ class PlatformClearance:
         first, last = self._world(start), self._world(end)
         turn = max((abs(end[axis] - start[axis]) for axis in self._rotary), default=0.0)
         bulge = math.radians(turn) ** 2 / 8.0 * REACH_UM
-        low = np.array([np.minimum(p.min(0), q.min(0)) for p, q in zip(first, last, strict=True)])
-        high = np.array([np.maximum(p.max(0), q.max(0)) for p, q in zip(first, last, strict=True)])
+        corners = np.stack((np.concatenate(first), np.concatenate(last)))
+        low = np.minimum.reduceat(corners.min(0), self._begins)
+        high = np.maximum.reduceat(corners.max(0), self._begins)
         apart = np.maximum(low[self._other] - high[self._one], low[self._one] - high[self._other])
         gaps = np.linalg.norm(np.maximum(apart, 0.0), axis=1) - bulge
         best = Near(("", ""), math.inf, 0.0)
@@ -294,8 +307,7 @@ class PlatformClearance:
         margin = float(self._margin[number])
         while True:
             positions = {axis: start[axis] + at * (end[axis] - start[axis]) for axis in start}
-            world = self._world(positions)
-            gap = distance(world[one], world[other])
+            gap = distance(*self._world(positions, one, other))
             least = min(least, gap)
             if at >= 1.0 or gap < margin - FINEST_UM:  # that is enough to be told
                 return least

@@ -9,6 +9,11 @@ import numpy as np
 from scipy.optimize import linprog, nnls
 from scipy.spatial import ConvexHull
 
+FEW = 400
+"""Differences that are looked at all at once."""
+EXACT = 1e-7
+"""How exact a distance is that took more, in the unit of the points."""
+
 
 def distance(one: np.ndarray, other: np.ndarray) -> float:
     """Return the distance of the hulls of two sets of points, 0 where they meet.
@@ -16,27 +21,41 @@ def distance(one: np.ndarray, other: np.ndarray) -> float:
     The plane that separates them widest is a least-distance problem (Lawson and Hanson, chapter
     23), dual to non-negative least squares over all differences of vertices.
     """
+    if len(one) * len(other) > FEW:
+        return _of_many(one, other)
     differences = (other[:, np.newaxis, :] - one[np.newaxis, :, :]).reshape(-1, 3)
-    if len(differences) > 400:
-        differences = _outer(differences)
-    return _from_origin(differences)
+    return float(np.linalg.norm(_nearest(differences)))
+
+
+def _of_many(one: np.ndarray, other: np.ndarray) -> float:
+    """Take in one difference after the other, always the nearest along what was found."""
+    taken = [other[0] - one[0]]
+    while True:
+        found = _nearest(np.array(taken))
+        size = float(np.linalg.norm(found))
+        if size == 0.0:
+            return 0.0
+        nearer = other[np.argmin(other @ found)] - one[np.argmax(one @ found)]
+        if nearer @ found >= size * (size - EXACT) or any((nearer == t).all() for t in taken):
+            return size
+        taken.append(nearer)
 
 
 def _outer(points: np.ndarray) -> np.ndarray:
     return points[ConvexHull(points).vertices]
 
 
-def _from_origin(points: np.ndarray) -> float:
+def _nearest(points: np.ndarray) -> np.ndarray:
+    """Return the point of the hull that is nearest to the origin."""
     scale = float(np.abs(points).max())
     if scale == 0.0:
-        return 0.0
+        return np.zeros(3)
     # Find the smallest w with w . p >= 1 for all points p; the distance is 1 / |w|.
     system = np.vstack((points.T / scale, np.ones(len(points))))
     weights, left = nnls(system, np.array([0.0, 0.0, 0.0, 1.0]), maxiter=30 * len(points))
     if left < 1e-11:
-        return 0.0
-    nearest = weights @ points / weights.sum()
-    return float(np.linalg.norm(nearest))
+        return np.zeros(3)
+    return weights @ points / weights.sum()
 
 
 def lower_distance(one: np.ndarray, other: np.ndarray, normal: np.ndarray) -> float:
