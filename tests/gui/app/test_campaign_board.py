@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QModelIndex, Qt
+from PySide6.QtCore import QModelIndex, QPoint, QRect, Qt
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.campaign.board import CampaignBoard
@@ -188,6 +188,23 @@ def test_a_card_shows_image_curves_and_numbers(card: FibreCard, qtbot: QtBot) ->
     assert replayed == [12]
 
 
+@pytest.mark.parametrize(("width", "height"), [(1100, 480), (780, 320)])
+def test_what_was_measured_is_seen_without_scrolling(
+    card: FibreCard, qtbot: QtBot, width: int, height: int
+) -> None:
+    """The room of the card in the window of 1366 x 768, and of 1024 x 600."""
+    card.resize(width, height)
+    card.set_card(card_of(good(1)))
+    assert "N m²" in card.value.text()
+    for widget in (card.value, card.curves):
+        qtbot.waitUntil(lambda seen=widget: _all_seen(seen, card), timeout=2_000)
+
+
+def _all_seen(widget: QWidget, card: FibreCard) -> bool:
+    place = QRect(widget.mapTo(card, QPoint()), widget.size())
+    return widget.isVisible() and card.rect().contains(place)
+
+
 def _texts(card: FibreCard) -> list[str]:
     found = []
     for grid in (card.numbers, card.spans):
@@ -206,6 +223,7 @@ def test_a_card_of_a_failed_fibre_says_why(card: FibreCard) -> None:
     assert "did not follow" in card.text.text()
     assert card.failures.text() == "Failed operations: close: missed grasp, close: missed grasp"
     assert not card.curves.isVisible()
+    assert card.value.text() == ""
     assert not any("N m²" in text for text in _texts(card))
 
 

@@ -9,6 +9,7 @@ from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.campaign.dock import CAMPAIGN
 from cosmic.app.panels.campaign.panel import CampaignPanel
+from cosmic.app.panels.results.panel import ResultsPanel
 from cosmic.app.platform import Platform, build_platform
 from cosmic.app.windows.closing import CloseDialog
 from cosmic.app.windows.operator_window import OperatorWindow
@@ -90,6 +91,18 @@ def close_and_check(window: OperatorWindow, campaign: Campaign, home: Path) -> l
     return [each.outcome for each in reader.fibres()]
 
 
+def wait_for_listing(window: OperatorWindow, qtbot: QtBot, folder: Path) -> None:
+    """Wait until the results list a campaign, wherever it lies."""
+    results = window.findChild(ResultsPanel)
+    assert results is not None
+    results.refresh()
+
+    def seen() -> bool:
+        return any(item.path == folder for each in results.sessions.sessions for item in each.items)
+
+    qtbot.waitUntil(seen, timeout=10_000)
+
+
 def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
     make: Make, qtbot: QtBot, tmp_path: Path
 ) -> None:
@@ -112,6 +125,7 @@ def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
     panel = panel_of(window, qtbot)
     qtbot.waitUntil(lambda: panel.board.state.text() == "stopped", timeout=5_000)
     qtbot.waitUntil(panel.procedure.resume.isEnabled, timeout=5_000)
+    wait_for_listing(window, qtbot, tmp_path / "out")
     window.top_bar.reset_requested.emit()
     button = coach.findChild(QPushButton, "coachButton")
     assert isinstance(button, QPushButton)

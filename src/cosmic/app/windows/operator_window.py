@@ -244,6 +244,9 @@ class OperatorWindow(CosmicServerGui):
             self._instruments,
             settings,
         )
+        campaign = self._campaign
+        if campaign is not None:
+            self._tasks.campaigns = lambda: campaign.home
         self._tasks.add_coach(
             coach_rules(self, self._rig, self._mico_gui, self._tasks, self._campaign)
         )

@@ -1,5 +1,6 @@
 """The operator's window by task: six workspaces around one picture, with coach and drawer."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -141,7 +142,14 @@ class TaskLayout(QObject):
         The axes and the scene.
     instruments : Instruments
         Image and force.
+
+    Attributes
+    ----------
+    campaigns : callable
+        Returns where campaigns are looked for beside the folder of all.
     """
+
+    campaigns: Callable[[], Path] = staticmethod(campaigns_folder)
 
     def __init__(
         self,
@@ -370,7 +378,7 @@ class TaskLayout(QObject):
 
     def _folders(self) -> tuple[Path, ...]:
         """Return where recordings are looked for."""
-        found = [self.folder.home, campaigns_folder()]
+        found = [self.folder.home, campaigns_folder(), self.campaigns()]
         if not self._force_remote():
             found.append(self._rig.daqco.directory)
         views = self._images.cameras.values()

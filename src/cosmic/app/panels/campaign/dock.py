@@ -85,6 +85,13 @@ class CampaignDock(QObject):
         return panel
 
     @property
+    def home(self) -> Path:
+        """Where the campaign begun here last lies; before one, where they are made."""
+        panel = self._late.made
+        campaign = panel.campaign if panel is not None else None
+        return campaigns_folder() if campaign is None else campaign.store.folder.parent
+
+    @property
     def running(self) -> bool:
         """True while a campaign that was begun here is running."""
         panel = self._late.made

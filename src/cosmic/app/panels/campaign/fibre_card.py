@@ -38,6 +38,7 @@ from cosmic.autonomy.campaign.snapshot import FibreCardData, Mask, SpanCurve
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.chip import Chip
+from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.palette import OKABE_ITO, ON_IMAGE, Palette
 from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
@@ -153,6 +154,10 @@ class FibreCurves(CurveFrame):
         self.labels: list[pg.TextItem] = []
         self._restyle()
 
+    @override
+    def sizeHint(self) -> QSize:
+        return QSize(48 * STEP_PX, 36 * STEP_PX)  # the plot's own is that of all it may draw
+
     def show_curves(self, curves: Sequence[SpanCurve]) -> None:
         """Draw the spans of a fibre."""
         self._curves = tuple(curves)
@@ -243,6 +248,8 @@ class FibreCard(QWidget):
         self.title = named(QLabel("no fibre chosen"), "cardTitle")
         self.title.setFont(number_font(bold=True))
         self.outcome = Chip("", tip="Outcome of the treatment")
+        self.value = named(ElidedLabel(), "cardValue")
+        self.value.setFont(number_font(bold=True))
         self.replay = named(
             push_button("Replay", "Replay its movements in the 3D view. Nothing moves."),
             "cardReplay",
@@ -266,7 +273,7 @@ class FibreCard(QWidget):
         head.setSpacing(STEP_PX)
         for widget in (self.indicator, self.title, self.outcome):
             head.addWidget(widget)
-        head.addStretch(1)
+        head.addWidget(self.value, 1)
         head.addWidget(self.replay)
         seen = QVBoxLayout()
         seen.setSpacing(STEP_PX // 2)
@@ -323,6 +330,7 @@ class FibreCard(QWidget):
         self.title.setText(f"Fibre {card.number}")
         self.outcome.setText(f"{card.outcome}: {card.cause}" if card.cause else str(card.outcome))
         self.outcome.show()
+        self.value.set_text(*_values(card))
         self.replay.setEnabled(True)
         _say(self.text, card.text)
         self.images.clear()
@@ -346,6 +354,7 @@ class FibreCard(QWidget):
         self.indicator.set_state(None)
         self.title.setText("no fibre chosen")
         self.outcome.hide()
+        self.value.set_text("")
         self.replay.setEnabled(False)
         self.images.clear()
         self.images.hide()
@@ -387,15 +396,22 @@ def _say(label: QLabel, text: str) -> None:
     label.setVisible(bool(text))
 
 
+def _values(card: FibreCardData) -> tuple[str, ...]:
+    """Return what was measured with its interval, and shorter; an empty text where nothing was."""
+    ei = card.ei
+    if ei is None:
+        return ("",)
+    value, trusted = stiffness(ei.ei_n_m2), "" if ei.trusted else ", not trusted"
+    bounds = interval(ei.ei_low_n_m2, ei.ei_high_n_m2)
+    return f"{value} ({bounds}) {EI_LABEL}{trusted}", f"{value} ({bounds})"
+
+
 def _numbers(card: FibreCardData) -> list[tuple[str, str]]:
     """Return name and value of what is known of a fibre."""
-    shape, ei = card.shape, card.ei
+    shape = card.shape
     rows = []
-    if ei is not None:
-        bounds = interval(ei.ei_low_n_m2, ei.ei_high_n_m2)
-        trusted = "" if ei.trusted else ", not trusted"
-        words = f"{stiffness(ei.ei_n_m2)} ({bounds}) {EI_LABEL}{trusted}"
-        rows.append(("stiffness (95 %)", words))
+    if card.ei is not None:
+        rows.append(("stiffness (95 %)", _values(card)[0]))
     rows += [
         ("length (95 %)", length_words(shape)),
         ("width (95 %)", f"{width_words(shape)} µm"),
