@@ -11,24 +11,25 @@ from PySide6.QtCore import QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QColor, QDesktopServices, QHideEvent, QImage, QPen, QPolygonF, QShowEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
-    QLabel,
     QSplitter,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
 )
 
+from cosmic.app.panels.results.campaign_page import CampaignPage
 from cosmic.app.panels.results.pictures import still_pixels
 from cosmic.app.panels.results.session_list import THUMBNAIL, SessionList
 from cosmic.app.panels.results.viewer import ResultViewer
 from cosmic.app.results.sessions import Item, ItemKind
 from cosmic.app.results.timeline import Timeline, load_timeline
 from cosmic.autonomy.campaign.records import CampaignError
+from cosmic.autonomy.campaign.storage_format import DATABASE
 from cosmic.daqco.api.recording import open_recording
 from cosmic.frame.background import BackgroundJobs
 from cosmic.frame.errors import CosmicError, RecordingError
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.gui.build import named, push_button
+from cosmic.frame.gui.build import named
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.palette import OKABE_ITO
@@ -78,34 +79,24 @@ class ResultsPanel(QWidget):
         self._reported = Relay(self._on_report)
         self.sessions = SessionList(folders, self._jobs, thumbnail_of)
         self.sessions.chosen.connect(self._on_chosen)
+        self.sessions.again.clicked.connect(self._read_campaign)
         self.viewer = ResultViewer(self._jobs, model)
         self.viewer.export_requested.connect(self.export)
         self.message = named(ElidedLabel(), "resultsMessage")
         self.message.clicked.connect(self._open_written)
         self._written: Path | None = None
-        self.about = QLabel()
-        self.about.setWordWrap(True)
-        self.report = named(
-            push_button(
-                "Open report", "Open the report of this campaign; it is written if need be"
-            ),
-            "openReport",
-        )
-        self.report.clicked.connect(self.open_report)
+        self.campaign = CampaignPage(self._jobs)
+        self.campaign.report_requested.connect(self.open_report)
+        self.campaign.failed.connect(self.message.set_text)
         self.open_file: Callable[[Path], object] = open_with_desktop
         self._arrange()
         self._follow = QTimer(self, interval=FOLLOW_MS)
         self._follow.timeout.connect(self._on_follow)
 
     def _arrange(self) -> None:
-        campaign = QWidget()
-        column = QVBoxLayout(campaign)
-        column.addWidget(self.about)
-        column.addWidget(self.report, 0, Qt.AlignmentFlag.AlignLeft)
-        column.addStretch(1)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.viewer)
-        self.pages.addWidget(campaign)
+        self.pages.addWidget(self.campaign)
         right = QWidget()
         column = QVBoxLayout(right)
         column.setContentsMargins(0, 0, 0, 0)
@@ -127,6 +118,7 @@ class ResultsPanel(QWidget):
     def refresh(self) -> None:
         """Look for recordings again; returns at once."""
         self.sessions.refresh()
+        self._read_campaign()
 
     def show_file(self, file: Path) -> None:
         """Choose a recording, as soon as it is listed."""
@@ -138,11 +130,15 @@ class ResultsPanel(QWidget):
         campaign = bool(items) and items[0].kind is ItemKind.CAMPAIGN
         self.pages.setCurrentIndex(1 if campaign else 0)
         if campaign:
-            self.about.setText(f"Campaign {items[0].name}\n{items[0].path}")
             self._asked = items[:1]
+            self._read_campaign()
             return
         self._asked = tuple(e for e in items if e.kind is not ItemKind.CAMPAIGN)[:MOST_COMPARED]
         self._load()
+
+    def _read_campaign(self) -> None:
+        if self._asked and self._asked[0].kind is ItemKind.CAMPAIGN:
+            self.campaign.show_campaign(self._asked[0].path)
 
     def _load(self) -> None:
         """Have what is chosen read; while something is read, only the newest choice waits."""
@@ -230,11 +226,11 @@ class ResultsPanel(QWidget):
             from cosmic.autonomy.campaign.store_read import CampaignReader
 
             page = folder / REPORT
-            if not page.exists():
-                try:
+            try:
+                if not page.exists() or is_older(page, folder / DATABASE):
                     write_report(CampaignReader(folder), page)
-                except OSError as exc:
-                    raise CampaignError(f"{page} cannot be written: {exc}") from exc
+            except OSError as exc:
+                raise CampaignError(f"{page} cannot be written: {exc}") from exc
             return page
 
         self._jobs.do(report, self._reported)
@@ -280,6 +276,11 @@ def write_values(
         rows.writerow(["recording", "time_s" if over == "time" else over, f"force, {unit}"])
         for name, where, what in curves:
             rows.writerows((name, f"{x:.6g}", f"{y:.6g}") for x, y in zip(where, what, strict=True))
+
+
+def is_older(file: Path, other: Path) -> bool:
+    """Tell whether a file was written before another; raises `OSError`."""
+    return file.stat().st_mtime_ns < other.stat().st_mtime_ns
 
 
 def _state_of(item: Item) -> tuple[int, int]:
