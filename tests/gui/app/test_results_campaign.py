@@ -81,6 +81,27 @@ def test_a_campaign_of_before_shows_how_it_went_and_its_fibres(
     assert overlapping(panel) == []
 
 
+def test_a_campaign_has_an_image_of_its_first_fibre_in_the_list(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_campaign(tmp_path / "pine")
+    CampaignStore.create(tmp_path / "birch", INFO).close()
+    row_of(panel, qtbot, "birch")
+    greys = set()
+
+    def drawn(name: str) -> bool:
+        row = panel.sessions.row_of(name)
+        assert row is not None
+        image = row.icon(0).pixmap(56, 32).toImage()
+        middle = image.height() // 2
+        greys.update(image.pixelColor(x, middle).value() for x in range(image.width()))
+        return max(greys) > 100
+
+    qtbot.waitUntil(lambda: drawn("pine"))
+    greys.clear()
+    assert not drawn("birch")
+
+
 def test_another_campaign_shows_nothing_of_the_one_before(
     panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:

@@ -24,7 +24,7 @@ from cosmic.app.panels.results.viewer import ResultViewer
 from cosmic.app.results.sessions import Item, ItemKind
 from cosmic.app.results.timeline import Timeline, load_timeline
 from cosmic.autonomy.campaign.records import CampaignError
-from cosmic.autonomy.campaign.storage_format import DATABASE
+from cosmic.autonomy.campaign.storage_format import DATABASE, FIBRES
 from cosmic.daqco.api.recording import open_recording
 from cosmic.frame.background import BackgroundJobs
 from cosmic.frame.errors import CosmicError, RecordingError
@@ -304,12 +304,18 @@ def thumbnail_of(item: Item) -> QImage | None:
             with open_image_recording(item.path) as images:
                 return _scaled(images[len(images) // 2].data) if len(images) else None
         if item.kind is ItemKind.IMAGE:
-            from cosmic.vico.core.measuring.image_files import read_images
-
-            return _scaled(still_pixels(next(iter(read_images(item.path))).pixels))
+            return _still_image(item.path)
+        if item.kind is ItemKind.CAMPAIGN:  # the first fibre that was seen
+            return _still_image(min((item.path / FIBRES).glob("*.png")))
     except (CosmicError, OSError, IndexError, ValueError, StopIteration) as exc:
         logger.debug("%s has no thumbnail: %s", item.path, exc)
     return None
+
+
+def _still_image(path: Path) -> QImage:
+    from cosmic.vico.core.measuring.image_files import read_images
+
+    return _scaled(still_pixels(next(iter(read_images(path))).pixels))
 
 
 def _curve_image(path: Path) -> QImage:
