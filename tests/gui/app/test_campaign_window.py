@@ -1,5 +1,6 @@
 """A window that is closed while a campaign runs in it: a safe end, and the record stays."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
+from cosmic.app.panels.campaign import dock
 from cosmic.app.panels.campaign.dock import CAMPAIGN
 from cosmic.app.panels.campaign.panel import CampaignPanel
 from cosmic.app.panels.results.panel import ResultsPanel
@@ -137,6 +139,19 @@ def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
     assert campaign.progress.elapsed_s <= again.progress.elapsed_s
     qtbot.waitUntil(lambda: moves(again), timeout=30_000)
     assert close_and_check(window, again, tmp_path) == []
+
+
+def test_a_window_that_was_closed_soon_loads_no_panel_any_more(
+    make: Make, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else its thread ran while the program ended, which ended in an abort."""
+    monkeypatch.setattr(dock, "LOAD_AFTER_MS", 3000)
+    monkeypatch.delitem(sys.modules, dock.PANEL)
+    window = make(whole_platform())
+    window.close_now()
+    assert dock.PANEL not in sys.modules
+    qtbot.wait(4000)
+    assert dock.PANEL not in sys.modules
 
 
 @pytest.mark.slow

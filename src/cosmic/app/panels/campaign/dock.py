@@ -68,7 +68,9 @@ class CampaignDock(QObject):
         window.add_panel(CAMPAIGN, self._late, scroll=False, beside=beside, tabbed=True)
         self._loading: JobQueue | None = None
         self._loaded = Relay(self._on_loaded)
-        QTimer.singleShot(LOAD_AFTER_MS, self, self._load)
+        self._load_later = QTimer(self, interval=LOAD_AFTER_MS, singleShot=True)
+        self._load_later.timeout.connect(self._load)
+        self._load_later.start()
 
     @property
     def panel(self) -> "CampaignPanel":
@@ -135,6 +137,7 @@ class CampaignDock(QObject):
 
     def shut_down(self) -> None:
         """End what runs; what it did is kept."""
+        self._load_later.stop()
         if self._loading is not None:
             self._loading.request_end()
             self._loading.join()
