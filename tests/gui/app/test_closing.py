@@ -9,6 +9,7 @@ from pytestqt.qtbot import QtBot
 
 from cosmic.app.windows.closing import CloseDialog, ParkDialog
 from cosmic.app.windows.operator_window import OperatorWindow
+from cosmic.vico.api.vico import vico_of
 from gui.app.windows import Make, mico
 
 LEFT = Qt.MouseButton.LeftButton
@@ -73,6 +74,25 @@ def test_what_is_lost_is_asked_again_after_a_close_that_was_cancelled_at_the_sec
     assert "first.h5" in again.informativeText()
     recording.close_now()
     assert not recording.isVisible()
+
+
+def test_closing_asks_while_images_are_recorded(make: Make, qtbot: QtBot, tmp_path: Path) -> None:
+    window = make(applications=("mico", "daqco", "vico"), rate=1.0)
+    vico = window.platform.vico
+    assert vico is not None
+    camera = vico_of(vico).camera()
+    qtbot.waitUntil(lambda: camera.newest_id is not None, timeout=15_000)
+    camera.record(tmp_path / "film")
+    qtbot.waitUntil(lambda: camera.recording.active)
+    window.close()
+    dialog = question(window)
+    assert dialog is not None
+    assert "The images film" in dialog.informativeText()
+    qtbot.mouseClick(dialog.cancel, LEFT)
+    camera.stop_recording(wait=True)
+    qtbot.waitUntil(lambda: question(window) is None)
+    window.close()
+    assert not window.isVisible()
 
 
 def test_the_end_of_the_program_waits_for_no_answer(recording: OperatorWindow) -> None:

@@ -27,7 +27,7 @@ def what_is_lost(rig: Rig, operations: FibreOperations | None, *, force: bool) -
     operations : FibreOperations or None
         What knows of a fibre that is held.
     force : bool
-        Recordings are made by this program.
+        Recordings of it are made by this program.
     """
     found: list[str] = []
     if running := rig.running:
@@ -44,15 +44,30 @@ def what_is_lost(rig: Rig, operations: FibreOperations | None, *, force: bool) -
             f"The {handling.held_by} gripper holds a fibre: it stays in the jaws, and nothing "
             "knows of it at the next start. Put it away first."
         )
-    if force:
-        try:
-            recording = rig.daqco.recording
-        except CosmicError:
-            recording = None  # what cannot be asked must not keep the window open
-        if recording is not None and recording.active:
-            name = recording.path.name if recording.path is not None else ""
-            found.append(f"The recording {name} ends; what it has is kept.")
+    found += [f"The recording {name} ends; what it has is kept." for name in _force(rig) if force]
+    found += [f"The images {name} end; what they have is kept." for name in _images(rig)]
     return tuple(found)
+
+
+def _force(rig: Rig) -> list[str]:
+    """Return the name of the recording of the force that is written."""
+    try:
+        recording = rig.daqco.recording
+    except CosmicError:
+        return []  # what cannot be asked must not keep the window open
+    if not recording.active:
+        return []
+    return [recording.path.name if recording.path is not None else ""]
+
+
+def _images(rig: Rig) -> list[str]:
+    """Return the names of the recordings of images that this program writes."""
+    try:
+        cameras = [rig.vico.camera(name) for name in rig.vico.cameras]
+        recordings = [each.recording for each in cameras if not each.remote]
+    except CosmicError:
+        return []
+    return [each.path.name if each.path is not None else "" for each in recordings if each.active]
 
 
 class CloseDialog(QMessageBox):
