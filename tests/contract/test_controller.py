@@ -18,6 +18,7 @@ from contract.controller_rig import (
     simulated_mcs2,
     simulated_serial,
 )
+from cosmic.frame.clock import RatedClock
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.mico.hw.interface import (
     Activity,
@@ -29,6 +30,8 @@ from cosmic.mico.hw.interface import (
     SafeDirectionRead,
 )
 from cosmic.mico.hw.joined import JoinedController
+from cosmic.mico.hw.sim_smaractctl import load_simulated_library as load_simulated_smaractctl
+from cosmic.mico.hw.smaractctl import SmaractCtlController
 from cosmic.testing.controllers import ControllerContract
 
 LINEAR, OTHER_LINEAR = Channel(0, 0), Channel(0, 1)
@@ -257,3 +260,18 @@ def test_a_group_of_an_mcs2_starts_together(make: Callable[[], Controller]) -> N
         rig.come_to_rest(other)
         assert rig.position(LINEAR) == pytest.approx(300.0, abs=0.2)
         assert rig.position(other) == pytest.approx(-150.0, abs=0.2)
+
+
+def test_a_speed_that_an_mcs2_refuses_in_motion_can_be_refused_as_often_as_one_likes() -> None:
+    """The library keeps 240 answers that nobody has fetched, and takes no question after that."""
+    library = load_simulated_smaractctl("LLL", clock=RatedClock(1.0))
+    with Rig(SmaractCtlController(library, simulated=True)) as rig:
+        rig.controller.set_closed_loop_frequency(LINEAR, 50)
+        rig.controller.move_to(LINEAR, 3000.0, "um", hold_s=0.0)
+        rig.controller.set_speed(LINEAR, 100.0, 1000.0, "um")
+        for _ in range(250):
+            with pytest.raises(DeviceError) as refusal:
+                rig.controller.move_to(LINEAR, 2000.0, "um", hold_s=0.0)
+            assert refusal.value.fault is DeviceFault.BUSY
+        rig.controller.stop(LINEAR)
+        assert math.isfinite(rig.position(LINEAR))

@@ -527,8 +527,13 @@ class SmaractCtlController(Controller):
         self._checked(code, f"{call}{args}", at=channel)
 
     def _write(self, channel: Channel, writes: Writes) -> None:
-        """Write properties one behind the other, then wait until all are acknowledged."""
+        """Write properties one behind the other, then wait until all are acknowledged.
+
+        Each is waited for, whatever became of those before: the library keeps the number of a
+        request until its answer is fetched, and has 240 of them.
+        """
         at = self._at(channel, "writing")
+        codes: list[tuple[int, str]] = []
         numbers: list[tuple[int, int]] = []
         for key, value in writes:
             number = c_uint8()
@@ -537,11 +542,15 @@ class SmaractCtlController(Controller):
             code = self._library.call(
                 call, at.handle, channel.channel, key, value, byref(number), 0
             )
-            self._checked(code, f"{call}({key:#010x}, {value})", at=channel)
+            if code != sa.SA_CTL_ERROR_NONE:
+                codes.append((code, f"{call}({key:#010x}, {value})"))
+                break
             numbers.append((number.value, key))
         for asked, key in numbers:
             code = self._library.call("SA_CTL_WaitForWrite", at.handle, asked)
-            self._checked(code, f"writing {key:#010x}", at=channel)
+            codes.append((code, f"writing {key:#010x}"))
+        for code, call in codes:
+            self._checked(code, call, at=channel)
 
     # Where
 
