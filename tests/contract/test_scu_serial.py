@@ -103,6 +103,23 @@ def test_a_stop_overtakes_what_waits_and_what_was_to_move_its_channel_is_not_sen
     assert "MPA1P7.0H0" in lines.units[0].heard
 
 
+def test_a_stop_is_sent_though_another_thread_queues_a_movement_meanwhile(rig, lines):
+    class InterruptedChannel(Channel):
+        """While it is compared, another thread has its turn."""
+
+        def __eq__(self, other):
+            rig.controller.move_by(OTHER, 1.0, "um", hold_s=0.0)
+            return super().__eq__(other)
+
+        __hash__ = Channel.__hash__
+
+    lines.units[0].deaf = {"MPR"}  # what is queued stays queued
+    for at in (OTHER, InterruptedChannel(0, 1), OTHER):
+        rig.controller.move_by(at, 1.0, "um", hold_s=0.0)
+    rig.controller.stop(AT)
+    assert lines.units[0].heard == ["MPR1P1.0H0", "S0"]
+
+
 @pytest.mark.parametrize("pieces", [1, 3])
 def test_lines_that_come_in_pieces_are_put_together(rig, lines, pieces):
     lines.units[0].pieces = pieces
