@@ -6,6 +6,8 @@ It knows the protocol from its description alone, and shares nothing with the dr
 import re
 from collections import deque
 
+from cosmic.frame.errors import NotConnectedError
+
 KINDS = {"L": 1, "R": 10, "N": 0}
 
 
@@ -39,7 +41,7 @@ class FakeScuSerial:
         self.known = dict.fromkeys(range(len(layout)), 0)
         self.reports: set[int] = set()
         self.automatic = False
-        self.gone = False
+        self.gone = self.taken = False
 
     # The shape of serial.Serial
 
@@ -65,7 +67,7 @@ class FakeScuSerial:
         return len(data)
 
     def close(self) -> None:
-        self.automatic = False
+        self.automatic = self.taken = False
 
     def _check(self) -> None:
         if self.gone:
@@ -166,4 +168,8 @@ class FakeScuLines:
         self.units = [FakeScuSerial(each, 501 + index) for index, each in enumerate(layouts)]
 
     def open_port(self, name: str) -> FakeScuSerial:
-        return self.units[int(name)]
+        unit = self.units[int(name)]
+        if unit.taken:
+            raise NotConnectedError(f"serial port {name!r} is open already")
+        unit.taken = True
+        return unit

@@ -120,6 +120,17 @@ def test_a_stop_is_sent_though_another_thread_queues_a_movement_meanwhile(rig, l
     assert lines.units[0].heard == ["MPR1P1.0H0", "S0"]
 
 
+def test_an_opening_that_fails_half_way_leaves_no_port_taken(lines):
+    lines.units[2].deaf = {"K"}
+    opened = controller(lines)
+    with pytest.raises(DeviceError):
+        opened.open()
+    assert not any(unit.taken for unit in lines.units)
+    lines.units[2].deaf.clear()
+    assert len(opened.open()) == 4
+    opened.close()
+
+
 @pytest.mark.parametrize("pieces", [1, 3])
 def test_lines_that_come_in_pieces_are_put_together(rig, lines, pieces):
     lines.units[0].pieces = pieces

@@ -172,9 +172,14 @@ class ScuSerialController(Controller):
             for unit in (found[each] for each in found if each not in wanted):
                 unit.close()
             units = tuple(found[each] for each in wanted)
-            for index, unit in enumerate(units):
-                unit.index = index
-                self._guard(unit)
+            try:
+                for index, unit in enumerate(units):
+                    unit.index = index
+                    self._guard(unit)
+            except DeviceError:
+                for unit in units:
+                    unit.close()
+                raise
             self._units = units
         logger.info("%s opened with units %s", self.name, wanted)
         return tuple(
