@@ -6,6 +6,7 @@ import pytest
 
 from contract.controller_rig import Rig
 from contract.fake_scu_serial import FakeScuLines
+from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
 from cosmic.mico.hw.interface import (
     Activity,
@@ -17,6 +18,7 @@ from cosmic.mico.hw.interface import (
     SensorPresentRead,
 )
 from cosmic.mico.hw.scu_serial import ScuSerialController
+from cosmic.mico.hw.sim_scu_serial import SimulatedScus
 
 AT, OTHER, ROTARY = Channel(0, 0), Channel(0, 1), Channel(3, 0)
 
@@ -271,3 +273,11 @@ def test_a_unit_is_reported_to_stop_by_itself_when_this_program_falls_silent(lin
         lines.units[0].heard.clear()
         events(rig, 0, 0.1)
         assert "K" in lines.units[0].heard
+
+
+def test_a_simulated_unit_that_is_unplugged_is_left_out_as_a_real_one():
+    scus = SimulatedScus(clock=ManualClock(auto_advance=True))
+    scus.faults.inject("unplugged", device=1)
+    opened = ScuSerialController("0123", scus.open_port, keep_alive_s=0.0, simulated=True)
+    assert [each.serial for each in opened.open()] == [scus.units[n].serial for n in (0, 2, 3)]
+    opened.close()

@@ -9,6 +9,7 @@ from threading import Condition
 from typing import Final
 
 from cosmic.frame.clock import Clock, RatedClock
+from cosmic.frame.errors import DeviceFault, NotConnectedError
 from cosmic.mico.hw.sim_device import LibraryLock
 from cosmic.mico.hw.sim_faults import Faults
 from cosmic.mico.hw.sim_scu3d_device import Device
@@ -231,8 +232,16 @@ class SimulatedScus:
             self.faults.wire(unit.device, unit.changed)
 
     def open_port(self, name: str) -> SimulatedLine:
-        """Return the line to the unit of this number; raises `OSError` where it is unplugged."""
+        """Return the line to the unit of this number.
+
+        Raises
+        ------
+        NotConnectedError
+            It is unplugged.
+        """
         unit = self.units[int(name)]
         if unit.unplugged:
-            raise OSError("the simulated line is not there")
+            raise NotConnectedError(
+                f"the simulated line {name} is not there", fault=DeviceFault.COMMUNICATION
+            )
         return SimulatedLine(unit)
