@@ -167,3 +167,26 @@ def test_a_target_beyond_the_range_of_the_mode_is_refused_by_its_end(
         assert client.move(value, mode) == PARAMETER
         assert client.get(ERROR) == PARAMETER
         assert client.get(POSITION) == pytest.approx(before, abs=UM)
+
+
+def test_nothing_moves_while_the_amplifier_is_off(client: Client) -> None:
+    assert client.get(STATE) & AMPLIFIER_ON
+    assert client.put(CL_HERTZ, 50) == OK
+    assert client.begin(1000 * UM) == OK
+    assert client.put(AMPLIFIER, 0) == OK
+    assert client.finished() == AMPLIFIER_OFF
+    assert not client.get(STATE) & (AMPLIFIER_ON | MOVING)
+    for mode in (ABSOLUTE, STEP):
+        assert client.move(1, mode) == AMPLIFIER_OFF
+    assert client.put(AMPLIFIER, 1) == OK
+    assert client.move(1, STEP) == OK
+
+
+def test_steps_go_on_when_the_sensor_is_switched_off(client: Client) -> None:
+    assert (client.put(MODE, STEP), client.put(STEP_HERTZ, 1000)) == (OK, OK)
+    assert client.begin(1000) == OK
+    assert client.put(SENSOR_POWER, 0) == OK
+    assert client.finished() == OK
+    assert client.put(MODE, ABSOLUTE) == OK
+    assert client.begin(0) == OK
+    assert client.finished() == SENSOR_OFF
