@@ -190,3 +190,84 @@ def test_steps_go_on_when_the_sensor_is_switched_off(client: Client) -> None:
     assert client.put(MODE, ABSOLUTE) == OK
     assert client.begin(0) == OK
     assert client.finished() == SENSOR_OFF
+
+
+def test_a_null_text_is_refused_and_never_harms(
+    client: Client, caplog: pytest.LogCaptureFixture
+) -> None:
+    at = client.at(0, DEVICE_NAME)
+    assert client.call("SetProperty_s", *at, ct.c_char_p()) == PARAMETER
+    assert not caplog.records
+
+
+# --------------------------------------------------------------------------- requests
+
+
+def test_refused_and_cancelled_requests_leave_no_number_taken(client: Client) -> None:
+    for _ in range(300):
+        assert client.ask(STATE, transmission=77)[0] == BAD_TRANSMISSION
+    buffer = ct.c_uint32()
+    for _ in range(300):
+        assert client.call("CreateOutputBuffer", ct.c_uint32(client.handle), ct.byref(buffer)) == OK
+        code, number = client.ask(STATE, transmission=buffer.value)
+        assert code == OK
+        assert client.call("CancelOutputBuffer", ct.c_uint32(client.handle), buffer) == OK
+    assert client.read(number) == PARAMETER
+    code, number = client.ask(STATE)
+    assert (code, client.read(number)) == (OK, OK)
+
+
+def test_what_is_asked_in_a_buffer_is_answered_once_it_is_flushed(client: Client) -> None:
+    buffers = []
+    for _ in range(2):
+        buffer = ct.c_uint32()
+        assert client.call("CreateOutputBuffer", ct.c_uint32(client.handle), ct.byref(buffer)) == OK
+        buffers.append(buffer)
+    (_, first), (_, second) = (client.ask(STATE, transmission=each.value) for each in buffers)
+    assert client.call("FlushOutputBuffer", ct.c_uint32(client.handle), buffers[0]) == OK
+    assert client.call("CancelOutputBuffer", ct.c_uint32(client.handle), buffers[1]) == OK
+    assert (client.read(first), client.read(second)) == (OK, PARAMETER)
+
+
+# --------------------------------------------------------------------------- a lost connection
+
+
+def test_after_an_unplugged_cable_the_handle_is_of_no_use_until_it_is_closed(
+    client: Client,
+) -> None:
+    client.library.faults.inject("unplugged", device=0)
+    code, event = client.event()
+    assert (code, event.type) == (OK, CONNECTION_LOST)
+    client.library.faults.clear("unplugged")
+    assert client.put(MODE, STEP) == LOST
+    assert client.begin(1) == LOST
+    assert client.event(0)[0] == LOST
+    assert client.close() == OK
+    client.open()
+    assert client.move(1, STEP) == OK
+
+
+def test_with_auto_reconnect_the_handle_serves_again(client: Client) -> None:
+    assert client.put(AUTO_RECONNECT, 1) == OK
+    client.library.faults.inject("unplugged", device=0)
+    assert client.put(MODE, STEP) == LOST
+    client.library.faults.clear("unplugged")
+    assert client.move(1, STEP) == OK
+    assert client.close() == OK
+    client.open()
+    assert client.get(AUTO_RECONNECT) == 0
+
+
+def test_a_new_handle_can_be_waited_on_while_the_wait_on_the_old_one_returns() -> None:
+    client = Client(library=load_simulated_library("LLL", rate=1.0))
+    for _ in range(20):
+        codes: list[int] = []
+        waiter = threading.Thread(target=lambda said=codes: said.append(client.event()[0]))
+        waiter.start()
+        while client.event(0)[0] != BUSY_WAITING:
+            pass
+        assert client.close() == OK
+        client.open()
+        assert client.event(1)[0] == TIMEOUT
+        waiter.join(5.0)
+        assert codes == [CANCELED]
