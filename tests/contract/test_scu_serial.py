@@ -281,3 +281,16 @@ def test_a_simulated_unit_that_is_unplugged_is_left_out_as_a_real_one():
     opened = ScuSerialController("0123", scus.open_port, keep_alive_s=0.0, simulated=True)
     assert [each.serial for each in opened.open()] == [scus.units[n].serial for n in (0, 2, 3)]
     opened.close()
+
+
+def test_a_simulated_unit_stops_when_its_keep_alive_is_over_though_nobody_looks():
+    clock = ManualClock()
+    scus = SimulatedScus(clock=clock)
+    unit, stage = scus.units[0], scus.scene.stages["0.0"]
+    stage_um = stage.position(0.0)
+    unit.hear(b":K1000\n:SRC0R1\n:U0F1000A1000S30000\n")
+    clock.advance(10.0)
+    unit.hear(b":M0\n")
+    assert b":M0S" in (clock.advance(1.0), unit.say())[1]
+    went_um = stage.position(clock.now_s()) - stage_um
+    assert went_um == pytest.approx(1000 * stage.step_size(100.0, 1), rel=0.05)

@@ -113,10 +113,13 @@ class SimulatedUnit:
 
     def _go_on(self, now_s: float) -> None:
         """Let happen what is due, and say what of it is to be reported."""
-        if 0.0 < self._settings.keep_alive_s < now_s - self._heard_s:
+        over_s = self._heard_s + self._settings.keep_alive_s
+        if self._settings.keep_alive_s > 0.0 and over_s < now_s:
+            # It stopped then, though nobody looks before now.
             self._heard_s = now_s
+            self._device.advance(over_s)
             for channel in self._device.channels:
-                channel.stop(now_s)
+                channel.stop(over_s)
         self._device.advance(now_s)
         while (packet := self._device.queue.head(now_s)) is not None:
             self._device.queue.pop(now_s)
