@@ -9,7 +9,8 @@ import pytest
 from cosmic.frame.clock import ManualClock
 from cosmic.mico.hw.sim_smaractctl import SimulatedLibrary, load_simulated_library
 
-STATE, POSITION, SCALE_INVERSION = 0x0305000F, 0x0305001D, 0x02040025
+STATE, POSITION, TARGET = 0x0305000F, 0x0305001D, 0x0305001E
+SCALE_OFFSET, SCALE_INVERSION = 0x02040024, 0x02040025
 MODE, VELOCITY, CL_HERTZ, STEP_HERTZ = 0x03050087, 0x03050029, 0x0305002F, 0x0305002E
 LOW, HIGH, AMPLIFIER, SENSOR_POWER = 0x02040020, 0x02040021, 0x0302000D, 0x03080019
 DEVICE_NAME, AUTO_RECONNECT, OPTIONS, ERROR = 0x020F003D, 0xF01000A1, 0x0307005D, 0x0502007A
@@ -19,7 +20,7 @@ TIMEOUT = 0x0004
 FINISHED, CONNECTION_LOST = 0x0001, 0xF001
 ABSOLUTE, RELATIVE, STEP = 0, 1, 4
 MOVING, REFERENCED, AT_LIMIT, AMPLIFIER_ON = 0x1, 0x80, 0x200, 0x40000
-LONG = (POSITION, VELOCITY, LOW, HIGH)
+LONG = (POSITION, TARGET, SCALE_OFFSET, VELOCITY, LOW, HIGH)
 UM = 10**6
 
 
@@ -198,6 +199,22 @@ def test_a_null_text_is_refused_and_never_harms(
     at = client.at(0, DEVICE_NAME)
     assert client.call("SetProperty_s", *at, ct.c_char_p()) == PARAMETER
     assert not caplog.records
+
+
+# --------------------------------------------------------------------------- the scale
+
+
+@pytest.mark.parametrize(("key", "value"), [(SCALE_OFFSET, 1000 * UM), (SCALE_INVERSION, 1)])
+def test_a_relative_movement_after_a_new_scale_goes_on_from_where_the_stage_stands(
+    client: Client, key: int, value: int
+) -> None:
+    assert client.reference() == OK
+    assert client.move(300 * UM) == OK
+    assert client.put(key, value) == OK
+    before = client.get(POSITION)
+    assert client.get(TARGET) == pytest.approx(before, abs=UM)
+    assert client.move(5 * UM, RELATIVE) == OK
+    assert client.get(POSITION) == pytest.approx(before + 5 * UM, abs=UM)
 
 
 # --------------------------------------------------------------------------- requests

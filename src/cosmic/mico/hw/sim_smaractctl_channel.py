@@ -164,8 +164,12 @@ class Channel(SimulatedChannel):
 
     def rescale(self) -> None:
         """Let a new offset or inversion act; without a reference it waits for one."""
-        if self.referenced:
-            self.find_reference(self._origin)
+        if not self.referenced:
+            return
+        aimed = None if self.target is None else self.position(self.target)
+        self.find_reference(self._origin)
+        # Where it is to stand does not change, only what that is called.
+        self.target = None if aimed is None else self.logical(aimed)
 
     def forget(self, now_s: float) -> None:
         """Lose calibration and reference, as a new positioner type makes it."""
