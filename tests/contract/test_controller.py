@@ -208,6 +208,27 @@ def test_the_end_stops_are_found_in_both_directions(rig: Rig) -> None:
     assert found_um[0] < found_um[1] - 1000.0
 
 
+def test_an_end_stop_is_found_whatever_was_aimed_at_before(rig: Rig) -> None:
+    stops_um: dict[Direction, list[float]] = {each: [] for each in Direction}
+    rig.controller.report_completion(LINEAR)
+    ways = (Direction.FORWARD, Direction.FORWARD, Direction.BACKWARD, Direction.FORWARD)
+    for direction in ways:
+        run = partial(rig.controller.move_to_end_stop, LINEAR, direction, hold_s=0.0)
+        if not done(rig, run):
+            return
+        rig.come_to_rest(LINEAR)
+        stops_um[direction].append(rig.position(LINEAR))
+    (low_um,) = stops_um[Direction.BACKWARD]
+    assert stops_um[Direction.FORWARD] == pytest.approx(
+        [stops_um[Direction.FORWARD][0]] * 3, abs=1.0
+    )
+    assert low_um < stops_um[Direction.FORWARD][0] - 10_000.0
+    # Away from there it goes by as much as it is told.
+    rig.controller.move_by(LINEAR, -40.0, "um", hold_s=0.0)
+    rig.come_to_rest(LINEAR)
+    assert rig.position(LINEAR) == pytest.approx(stops_um[Direction.FORWARD][0] - 40.0, abs=1.0)
+
+
 def test_calibration_is_reported_when_it_has_ended(rig: Rig) -> None:
     rig.controller.report_completion(LINEAR)
     if done(rig, lambda: rig.controller.calibrate(LINEAR)):
