@@ -42,6 +42,7 @@ class FakeScuSerial:
         self.reports: set[int] = set()
         self.automatic = False
         self.gone = self.taken = False
+        self.inverted: set[int] = set()
 
     # The shape of serial.Serial
 
@@ -128,6 +129,7 @@ class FakeScuSerial:
             "M": f"M{channel}{self.status[channel]}",
             "GPPK": f"PPK{channel}K{self.known[channel]}",
             "GSD": f"SD{channel}D0",
+            "GSC": f"SC{channel}I{int(channel in self.inverted)}S-250000",
         }
         if name in told:
             return told[name]

@@ -1,5 +1,6 @@
 """Our controllers under the suite that other packages import, and what else these makes do."""
 
+import ctypes
 import math
 import re
 from collections.abc import Callable, Iterator
@@ -18,7 +19,10 @@ from contract.controller_rig import (
     simulated_mcs2,
     simulated_serial,
 )
-from cosmic.frame.clock import RatedClock
+from contract.fake_scu3d import LINEAR_TYPE, FakeScu3d
+from contract.fake_scu_serial import FakeScuLines
+from contract.fake_smaractctl import FakeSmaractctl
+from cosmic.frame.clock import ManualClock, RatedClock
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.mico.hw.interface import (
     Activity,
@@ -27,9 +31,14 @@ from cosmic.mico.hw.interface import (
     Controller,
     Direction,
     MatchedMove,
+    PositionerKind,
     SafeDirectionRead,
+    TypeRead,
 )
 from cosmic.mico.hw.joined import JoinedController
+from cosmic.mico.hw.scu3d import Scu3dController
+from cosmic.mico.hw.scu_serial import ScuSerialController
+from cosmic.mico.hw.sim_scu3d import load_simulated_library
 from cosmic.mico.hw.sim_smaractctl import load_simulated_library as load_simulated_smaractctl
 from cosmic.mico.hw.smaractctl import SmaractCtlController
 from cosmic.testing.controllers import ControllerContract
@@ -195,6 +204,51 @@ def test_a_channel_reports_which_way_it_looks_for_its_reference(rig: Rig) -> Non
     if not done(rig, lambda: rig.controller.ask_safe_direction(LINEAR)):
         return
     assert rig.event(SafeDirectionRead, LINEAR).direction is Direction.BACKWARD
+
+
+def inverted(make: str) -> Controller:
+    """Return a controller of a make whose channel 0.1 has an inverted scale stored."""
+    if make == "simulated_mcs2":
+        mcs2 = load_simulated_smaractctl(clock=ManualClock(auto_advance=True))
+        handle = ctypes.c_uint32()
+        assert mcs2.SA_CTL_Open(ctypes.byref(handle), b"usb:ix:0", b"") == 0
+        assert mcs2.SA_CTL_SetProperty_i32(handle, 1, 0x02040025, 1) == 0
+        assert mcs2.SA_CTL_Close(handle) == 0
+        return SmaractCtlController(mcs2, simulated=True)
+    if make == "simulated":
+        scu = load_simulated_library(clock=ManualClock(auto_advance=True))
+        assert scu.SA_InitDevices(0) == scu.SA_SetScale_S(0, 1, 250_000, 1) == 0
+        return Scu3dController(scu, simulated=True)
+    if make == "fake_mcs2":
+        fake_mcs2 = FakeSmaractctl({"MCS2-101": "LLL"})
+        fake_mcs2.devices[0].channels[1].written[0x02040025] = 1
+        return SmaractCtlController(fake_mcs2)
+    lines = FakeScuLines()
+    lines.units[0].inverted = {1}
+    return ScuSerialController("0", lines.open_port, answer_s=0.2)
+
+
+@pytest.mark.parametrize("make", ["simulated", "simulated_mcs2", "fake_mcs2", "fake_serial"])
+def test_an_axis_whose_scale_is_inverted_in_the_controller_has_no_kind_that_is_moved(
+    make: str,
+) -> None:
+    """Positions run the other way then; steps and searches for an end do not."""
+    with Rig(inverted(make)) as rig:
+        for at, kind in ((LINEAR, PositionerKind.LINEAR), (OTHER_LINEAR, None)):
+            rig.controller.ask_type(at)
+            found = rig.event(TypeRead, at).positioner
+            assert found.kind is kind
+            assert ("inverted" in found.name) is (kind is None)
+
+
+def test_a_stored_offset_is_not_taken_for_an_inverted_scale() -> None:
+    fake = FakeScu3d({101: [LINEAR_TYPE] * 3})
+    with Rig(Scu3dController(fake)) as rig:
+        fake.opened[0][0].offset_nm = 1
+        fake.opened[0][1].inverted = 1
+        for at, kind in ((LINEAR, PositionerKind.LINEAR), (OTHER_LINEAR, None)):
+            rig.controller.ask_type(at)
+            assert rig.event(TypeRead, at).positioner.kind is kind
 
 
 def test_the_end_stops_are_found_in_both_directions(rig: Rig) -> None:

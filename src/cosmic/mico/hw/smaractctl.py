@@ -340,6 +340,7 @@ class SmaractCtlController(Controller):
             sa.SA_CTL_PKEY_POSITIONER_TYPE_NAME,
             sa.SA_CTL_PKEY_POS_BASE_UNIT,
             sa.SA_CTL_PKEY_POS_REFERENCE_TYPE,
+            sa.SA_CTL_PKEY_LOGICAL_SCALE_INVERSION,
         )
         self._ask(channel, keys, events.positioner_type)
 
