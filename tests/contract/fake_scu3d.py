@@ -17,7 +17,7 @@ OK, NOT_INITIALIZED, NO_DEVICES, BAD_DEVICE, BAD_CHANNEL = 0, 2, 3, 5, 6
 BAD_PARAMETER, WRONG_MODE, LIST_TOO_SMALL, ALREADY_ADDED, NOT_FOUND = 9, 13, 17, 18, 19
 NO_SENSOR, WRONG_TYPE, OVERRIDDEN = 130, 131, 133
 NOTHING, ERROR, POSITION, ANGLE, COMPLETED, STATUS = 0, 1, 2, 3, 4, 5
-SENSOR_TYPE, SENSOR_PRESENT, SAFE_DIRECTION, KNOWN = 7, 8, 11, 13
+SENSOR_TYPE, SENSOR_PRESENT, SAFE_DIRECTION, SCALE, KNOWN = 7, 8, 11, 12, 13
 STOPPED, HOLDING = 0, 4
 LINEAR_TYPE, ROTARY_TYPE, NO_TYPE = 21, 19, 0
 
@@ -36,6 +36,8 @@ class FakeChannel:
     activity: int = STOPPED
     reports: bool = False
     known: bool = False
+    offset_nm: int = 0
+    inverted: int = 0
 
 
 class FakeScu3d:
@@ -109,6 +111,7 @@ class FakeScu3d:
         table: dict[str, tuple[list[type], Callable[..., int]]] = {
             "SA_SetReportOnComplete_A": ([u], self._report),
             "SA_GetSensorPresent_A": ([], self._sensor_present),
+            "SA_GetScale_A": ([], self._get_scale),
             "SA_GetSensorType_A": ([], self._sensor_type),
             "SA_GetPhysicalPositionKnown_A": ([], self._position_known),
             "SA_GetSafeDirection_A": ([], self._get_safe_direction),
@@ -220,6 +223,11 @@ class FakeScu3d:
 
     def _sensor_present(self, device: int, channel: int) -> int:
         self.push(device, SENSOR_PRESENT, channel, int(self._type(device, channel) != NO_TYPE))
+        return OK
+
+    def _get_scale(self, device: int, channel: int) -> int:
+        found = self.opened[device][channel]
+        self.push(device, SCALE, channel, found.inverted, found.offset_nm)
         return OK
 
     def _sensor_type(self, device: int, channel: int) -> int:

@@ -6,6 +6,8 @@ It knows the protocol from its description alone, and shares nothing with the dr
 import re
 from collections import deque
 
+from cosmic.frame.errors import NotConnectedError
+
 KINDS = {"L": 1, "R": 10, "N": 0}
 
 
@@ -39,7 +41,8 @@ class FakeScuSerial:
         self.known = dict.fromkeys(range(len(layout)), 0)
         self.reports: set[int] = set()
         self.automatic = False
-        self.gone = False
+        self.gone = self.taken = False
+        self.inverted: set[int] = set()
 
     # The shape of serial.Serial
 
@@ -65,7 +68,7 @@ class FakeScuSerial:
         return len(data)
 
     def close(self) -> None:
-        self.automatic = False
+        self.automatic = self.taken = False
 
     def _check(self) -> None:
         if self.gone:
@@ -126,6 +129,7 @@ class FakeScuSerial:
             "M": f"M{channel}{self.status[channel]}",
             "GPPK": f"PPK{channel}K{self.known[channel]}",
             "GSD": f"SD{channel}D0",
+            "GSC": f"SC{channel}I{int(channel in self.inverted)}S-250000",
         }
         if name in told:
             return told[name]
@@ -166,4 +170,8 @@ class FakeScuLines:
         self.units = [FakeScuSerial(each, 501 + index) for index, each in enumerate(layouts)]
 
     def open_port(self, name: str) -> FakeScuSerial:
-        return self.units[int(name)]
+        unit = self.units[int(name)]
+        if unit.taken:
+            raise NotConnectedError(f"serial port {name!r} is open already")
+        unit.taken = True
+        return unit

@@ -31,6 +31,7 @@ class Event(ct.Structure):
 class FakeChannel:
     letter: str
     position: int = 0
+    target: int = 0
     holding: bool = False
     referenced: bool = False
     written: dict[int, int] = field(default_factory=lambda: {HOLD: 0, MODE: 0, SAFE: 1})
@@ -57,10 +58,11 @@ class FakeChannel:
         if mode == 4:
             self.holding = False
             self.position += value * STEP[self.unit]
+            self.target = self.position
             return OK
         if not self.sensor:
             return NO_SENSOR
-        wanted = value if mode == 0 else self.position + value
+        self.target = wanted = value if mode == 0 else self.target + value
         reached = max(-END[self.unit], min(END[self.unit], wanted))
         self.position = reached
         self.holding = reached == wanted and self.written[HOLD] != 0
@@ -120,6 +122,13 @@ class FakeSmaractctl:
     def SA_CTL_GetProperty_i32(self, handle: int, _i: int, key: int, out: Any, _n: Any) -> int:
         out._obj.value = len(self.open[handle].channels) if key == CHANNELS else 0
         return OK
+
+    def SA_CTL_GetProperty_i64(self, handle: int, index: int, key: int, out: Any, _n: Any) -> int:
+        at = self._channel(handle, index)
+        if isinstance(at, int):
+            return at
+        code, out._obj.value = at.read(key)
+        return code
 
     def SA_CTL_SetProperty_i32(self, *_: Any) -> int:
         return OK

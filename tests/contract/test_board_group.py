@@ -8,7 +8,7 @@ import pytest
 from contract.board_rig import BoardRig, LabjackRig, NidaqmxRig, SimulatedRig, one_input
 from cosmic.daqco.hw.board_group import BoardGroup
 from cosmic.daqco.hw.interface import BoardChunk, OverrunError
-from cosmic.frame.errors import DeviceError, LimitError
+from cosmic.frame.errors import DeviceError, LimitError, ProtocolError
 
 INPUTS = {
     "Dev1": [one_input("ai3"), one_input("ai1")],
@@ -105,6 +105,25 @@ def test_a_board_that_cannot_start_leaves_none_running(rig: BoardRig) -> None:
         group.start()
     rig.go_on(20)
     assert group.receive(0.0) is None
+
+
+@pytest.mark.parametrize("call", ["start", "receive"])
+def test_a_board_that_fails_with_any_error_of_ours_stops_the_others(
+    rig: BoardRig, call: str
+) -> None:
+    """A board that another package brings may say that it cannot, or that an answer is garbled."""
+
+    def fails(*_args: object) -> None:
+        raise ProtocolError(f"Dev2: {call}: the answer was garbled")
+
+    first, second = rig.open("Dev1"), Late(rig.open("Dev2"))
+    group = BoardGroup([first, second])
+    group.configure(INPUTS, 1000.0, 10)
+    setattr(second, call, fails)
+    with pytest.raises(DeviceError, match="garbled"):
+        group.start()
+        group.receive(0.0)
+    first.start()  # which it refuses while it acquires
 
 
 def test_what_one_board_cannot_do_is_refused_for_all(rig: BoardRig) -> None:

@@ -125,6 +125,13 @@ def test_devices_without_analogue_inputs_or_answers_are_left_out(rig: NidaqmxRig
         rig.library.open("Dev1")
 
 
+def test_a_device_whose_inputs_take_no_voltages_is_left_out(rig: NidaqmxRig) -> None:
+    rig.driver.device("Dev2").ai_voltage_rngs = ()
+    assert [info.name for info in rig.library.list_boards()] == ["Dev1"]
+    with pytest.raises(NotConnectedError, match="Dev2"):
+        rig.library.open("Dev2")
+
+
 def test_the_library_reports_the_version_of_its_driver(rig: NidaqmxRig) -> None:
     assert rig.library.name == "NI-DAQmx 26.8"
 

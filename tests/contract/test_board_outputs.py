@@ -229,6 +229,20 @@ def test_one_waveform_a_board_is_played_at_a_time(player: OutputRig) -> None:
     outputs.close()
 
 
+def test_a_waveform_ends_when_the_board_is_given_back(player: OutputRig) -> None:
+    outputs = open_outputs(player.library, player.board)
+    outputs.play(PIEZO, Waveform(np.linspace(0.0, 5.0, 1001), 1000.0, repeat=True))
+    player.go_on(0.25)
+    outputs.close()
+    kept_v = player.volts("ao0")
+    for _ in range(3):
+        player.go_on(0.1)
+        assert player.volts("ao0") == kept_v
+    again = open_outputs(player.library, player.board)
+    assert again.playing == ""
+    again.close()
+
+
 # --- libraries --------------------------------------------------------------------------------
 
 

@@ -1,5 +1,6 @@
 """Our controllers under the suite that other packages import, and what else these makes do."""
 
+import ctypes
 import math
 import re
 from collections.abc import Callable, Iterator
@@ -18,6 +19,10 @@ from contract.controller_rig import (
     simulated_mcs2,
     simulated_serial,
 )
+from contract.fake_scu3d import LINEAR_TYPE, FakeScu3d
+from contract.fake_scu_serial import FakeScuLines
+from contract.fake_smaractctl import FakeSmaractctl
+from cosmic.frame.clock import ManualClock, RatedClock
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.mico.hw.interface import (
     Activity,
@@ -26,9 +31,16 @@ from cosmic.mico.hw.interface import (
     Controller,
     Direction,
     MatchedMove,
+    PositionerKind,
     SafeDirectionRead,
+    TypeRead,
 )
 from cosmic.mico.hw.joined import JoinedController
+from cosmic.mico.hw.scu3d import Scu3dController
+from cosmic.mico.hw.scu_serial import ScuSerialController
+from cosmic.mico.hw.sim_scu3d import load_simulated_library
+from cosmic.mico.hw.sim_smaractctl import load_simulated_library as load_simulated_smaractctl
+from cosmic.mico.hw.smaractctl import SmaractCtlController
 from cosmic.testing.controllers import ControllerContract
 
 LINEAR, OTHER_LINEAR = Channel(0, 0), Channel(0, 1)
@@ -194,6 +206,51 @@ def test_a_channel_reports_which_way_it_looks_for_its_reference(rig: Rig) -> Non
     assert rig.event(SafeDirectionRead, LINEAR).direction is Direction.BACKWARD
 
 
+def inverted(make: str) -> Controller:
+    """Return a controller of a make whose channel 0.1 has an inverted scale stored."""
+    if make == "simulated_mcs2":
+        mcs2 = load_simulated_smaractctl(clock=ManualClock(auto_advance=True))
+        handle = ctypes.c_uint32()
+        assert mcs2.SA_CTL_Open(ctypes.byref(handle), b"usb:ix:0", b"") == 0
+        assert mcs2.SA_CTL_SetProperty_i32(handle, 1, 0x02040025, 1) == 0
+        assert mcs2.SA_CTL_Close(handle) == 0
+        return SmaractCtlController(mcs2, simulated=True)
+    if make == "simulated":
+        scu = load_simulated_library(clock=ManualClock(auto_advance=True))
+        assert scu.SA_InitDevices(0) == scu.SA_SetScale_S(0, 1, 250_000, 1) == 0
+        return Scu3dController(scu, simulated=True)
+    if make == "fake_mcs2":
+        fake_mcs2 = FakeSmaractctl({"MCS2-101": "LLL"})
+        fake_mcs2.devices[0].channels[1].written[0x02040025] = 1
+        return SmaractCtlController(fake_mcs2)
+    lines = FakeScuLines()
+    lines.units[0].inverted = {1}
+    return ScuSerialController("0", lines.open_port, answer_s=0.2)
+
+
+@pytest.mark.parametrize("make", ["simulated", "simulated_mcs2", "fake_mcs2", "fake_serial"])
+def test_an_axis_whose_scale_is_inverted_in_the_controller_has_no_kind_that_is_moved(
+    make: str,
+) -> None:
+    """Positions run the other way then; steps and searches for an end do not."""
+    with Rig(inverted(make)) as rig:
+        for at, kind in ((LINEAR, PositionerKind.LINEAR), (OTHER_LINEAR, None)):
+            rig.controller.ask_type(at)
+            found = rig.event(TypeRead, at).positioner
+            assert found.kind is kind
+            assert ("inverted" in found.name) is (kind is None)
+
+
+def test_a_stored_offset_is_not_taken_for_an_inverted_scale() -> None:
+    fake = FakeScu3d({101: [LINEAR_TYPE] * 3})
+    with Rig(Scu3dController(fake)) as rig:
+        fake.opened[0][0].offset_nm = 1
+        fake.opened[0][1].inverted = 1
+        for at, kind in ((LINEAR, PositionerKind.LINEAR), (OTHER_LINEAR, None)):
+            rig.controller.ask_type(at)
+            assert rig.event(TypeRead, at).positioner.kind is kind
+
+
 def test_the_end_stops_are_found_in_both_directions(rig: Rig) -> None:
     found_um = []
     for direction in (Direction.BACKWARD, Direction.FORWARD):
@@ -203,6 +260,27 @@ def test_the_end_stops_are_found_in_both_directions(rig: Rig) -> None:
         assert rig.come_to_rest(OTHER_LINEAR) is Activity.STOPPED
         found_um.append(rig.position(OTHER_LINEAR))
     assert found_um[0] < found_um[1] - 1000.0
+
+
+def test_an_end_stop_is_found_whatever_was_aimed_at_before(rig: Rig) -> None:
+    stops_um: dict[Direction, list[float]] = {each: [] for each in Direction}
+    rig.controller.report_completion(LINEAR)
+    ways = (Direction.FORWARD, Direction.FORWARD, Direction.BACKWARD, Direction.FORWARD)
+    for direction in ways:
+        run = partial(rig.controller.move_to_end_stop, LINEAR, direction, hold_s=0.0)
+        if not done(rig, run):
+            return
+        rig.come_to_rest(LINEAR)
+        stops_um[direction].append(rig.position(LINEAR))
+    (low_um,) = stops_um[Direction.BACKWARD]
+    assert stops_um[Direction.FORWARD] == pytest.approx(
+        [stops_um[Direction.FORWARD][0]] * 3, abs=1.0
+    )
+    assert low_um < stops_um[Direction.FORWARD][0] - 10_000.0
+    # Away from there it goes by as much as it is told.
+    rig.controller.move_by(LINEAR, -40.0, "um", hold_s=0.0)
+    rig.come_to_rest(LINEAR)
+    assert rig.position(LINEAR) == pytest.approx(stops_um[Direction.FORWARD][0] - 40.0, abs=1.0)
 
 
 def test_calibration_is_reported_when_it_has_ended(rig: Rig) -> None:
@@ -257,3 +335,18 @@ def test_a_group_of_an_mcs2_starts_together(make: Callable[[], Controller]) -> N
         rig.come_to_rest(other)
         assert rig.position(LINEAR) == pytest.approx(300.0, abs=0.2)
         assert rig.position(other) == pytest.approx(-150.0, abs=0.2)
+
+
+def test_a_speed_that_an_mcs2_refuses_in_motion_can_be_refused_as_often_as_one_likes() -> None:
+    """The library keeps 240 answers that nobody has fetched, and takes no question after that."""
+    library = load_simulated_smaractctl("LLL", clock=RatedClock(1.0))
+    with Rig(SmaractCtlController(library, simulated=True)) as rig:
+        rig.controller.set_closed_loop_frequency(LINEAR, 50)
+        rig.controller.move_to(LINEAR, 3000.0, "um", hold_s=0.0)
+        rig.controller.set_speed(LINEAR, 100.0, 1000.0, "um")
+        for _ in range(250):
+            with pytest.raises(DeviceError) as refusal:
+                rig.controller.move_to(LINEAR, 2000.0, "um", hold_s=0.0)
+            assert refusal.value.fault is DeviceFault.BUSY
+        rig.controller.stop(LINEAR)
+        assert math.isfinite(rig.position(LINEAR))

@@ -8,12 +8,13 @@ import pytest
 
 from contract.controller_rig import Rig, simulated, simulated_mcs2
 from cosmic.frame.clock import ManualClock
-from cosmic.frame.errors import DeviceError, DeviceFault
+from cosmic.frame.errors import ConfigError, DeviceError, DeviceFault
 from cosmic.mico.hw.factory import join
 from cosmic.mico.hw.interface import Activity, Channel, Controller, Failed, PositionRead
 from cosmic.mico.hw.joined import JoinedController
 from cosmic.mico.hw.scu3d import Scu3dController
 from cosmic.mico.hw.sim_scu3d import SimulatedLibrary, load_simulated_library
+from cosmic.mico.hw.smaractctl import SmaractCtlController
 
 AT = Channel(0, 0)
 
@@ -138,3 +139,18 @@ def test_an_error_of_a_joined_part_names_the_device_as_the_platform_counts_it() 
         joined.move_to(Channel(5, 0), math.nan, "um", hold_s=0.0)
     assert (caught.value.device, caught.value.channel) == (5, 0)
     joined.close()
+
+
+def test_the_parts_that_are_open_are_closed_when_another_cannot_be_opened() -> None:
+    ours = simulated()
+    joined = JoinedController([ours, simulated_mcs2()])
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(SmaractCtlController, "open", _refuse)
+        with pytest.raises(ConfigError, match="no such option"):
+            joined.open()
+    assert len(joined.open()) == 8
+    joined.close()
+
+
+def _refuse(*_args: object) -> None:
+    raise ConfigError("no such option")

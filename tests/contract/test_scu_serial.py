@@ -6,6 +6,7 @@ import pytest
 
 from contract.controller_rig import Rig
 from contract.fake_scu_serial import FakeScuLines
+from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
 from cosmic.mico.hw.interface import (
     Activity,
@@ -17,6 +18,7 @@ from cosmic.mico.hw.interface import (
     SensorPresentRead,
 )
 from cosmic.mico.hw.scu_serial import ScuSerialController
+from cosmic.mico.hw.sim_scu_serial import SimulatedScus
 
 AT, OTHER, ROTARY = Channel(0, 0), Channel(0, 1), Channel(3, 0)
 
@@ -101,6 +103,34 @@ def test_a_stop_overtakes_what_waits_and_what_was_to_move_its_channel_is_not_sen
     events(rig, 0)
     assert "MPA0P900.0H0" not in lines.units[0].heard
     assert "MPA1P7.0H0" in lines.units[0].heard
+
+
+def test_a_stop_is_sent_though_another_thread_queues_a_movement_meanwhile(rig, lines):
+    class InterruptedChannel(Channel):
+        """While it is compared, another thread has its turn."""
+
+        def __eq__(self, other):
+            rig.controller.move_by(OTHER, 1.0, "um", hold_s=0.0)
+            return super().__eq__(other)
+
+        __hash__ = Channel.__hash__
+
+    lines.units[0].deaf = {"MPR"}  # what is queued stays queued
+    for at in (OTHER, InterruptedChannel(0, 1), OTHER):
+        rig.controller.move_by(at, 1.0, "um", hold_s=0.0)
+    rig.controller.stop(AT)
+    assert lines.units[0].heard == ["MPR1P1.0H0", "S0"]
+
+
+def test_an_opening_that_fails_half_way_leaves_no_port_taken(lines):
+    lines.units[2].deaf = {"K"}
+    opened = controller(lines)
+    with pytest.raises(DeviceError):
+        opened.open()
+    assert not any(unit.taken for unit in lines.units)
+    lines.units[2].deaf.clear()
+    assert len(opened.open()) == 4
+    opened.close()
 
 
 @pytest.mark.parametrize("pieces", [1, 3])
@@ -243,3 +273,24 @@ def test_a_unit_is_reported_to_stop_by_itself_when_this_program_falls_silent(lin
         lines.units[0].heard.clear()
         events(rig, 0, 0.1)
         assert "K" in lines.units[0].heard
+
+
+def test_a_simulated_unit_that_is_unplugged_is_left_out_as_a_real_one():
+    scus = SimulatedScus(clock=ManualClock(auto_advance=True))
+    scus.faults.inject("unplugged", device=1)
+    opened = ScuSerialController("0123", scus.open_port, keep_alive_s=0.0, simulated=True)
+    assert [each.serial for each in opened.open()] == [scus.units[n].serial for n in (0, 2, 3)]
+    opened.close()
+
+
+def test_a_simulated_unit_stops_when_its_keep_alive_is_over_though_nobody_looks():
+    clock = ManualClock()
+    scus = SimulatedScus(clock=clock)
+    unit, stage = scus.units[0], scus.scene.stages["0.0"]
+    stage_um = stage.position(0.0)
+    unit.hear(b":K1000\n:SRC0R1\n:U0F1000A1000S30000\n")
+    clock.advance(10.0)
+    unit.hear(b":M0\n")
+    assert b":M0S" in (clock.advance(1.0), unit.say())[1]
+    went_um = stage.position(clock.now_s()) - stage_um
+    assert went_um == pytest.approx(1000 * stage.step_size(100.0, 1), rel=0.05)

@@ -2,6 +2,7 @@
 
 import math
 import sys
+from types import ModuleType
 
 import pytest
 
@@ -12,6 +13,7 @@ from cosmic.mico.hw import pipython_stages, pylablib_stages
 from cosmic.mico.hw.factory import make_controller
 from cosmic.mico.hw.interface import Activity, Channel, Failed, PositionKnownRead, TypeRead
 from cosmic.mico.hw.interface import ReferenceKind as Kind
+from cosmic.mico.hw.stages import StageController
 
 AT, ROTARY, PICOMOTOR = Channel(0, 0), Channel(3, 0), Channel(3, 1)
 MAKES = [(FakePylablib, pylablib_stages), (FakePipython, pipython_stages)]
@@ -160,6 +162,69 @@ def test_a_device_that_cannot_be_stopped_is_not_driven(pylablib):
     package.kinesis = without_stop
     with pytest.raises(NotConnectedError, match="has no stop"):
         pylablib_stages.PylablibUnit(options, package)
+
+
+def test_a_device_that_cannot_be_closed_either_is_named_as_one(pylablib):
+    _, package = pylablib
+    options = package.controller_options().stages[0]
+    package.device_class = lambda _name: lambda *_arguments, **_keywords: object()
+    with pytest.raises(NotConnectedError, match="has no move_by, is_moving, stop, close"):
+        pylablib_stages.PylablibUnit(options, package)
+
+
+def test_a_controller_of_pi_that_does_not_say_what_it_is_is_disconnected():
+    package = FakePipython()
+    stage = package.controller_options().stages[0]
+    connect = package.connect
+
+    def connect_to_one_that_is_silent(options):
+        device, disconnect = connect(options)
+        device.axes.gone = True
+        device.qIDN = device.axes.check
+        return device, disconnect
+
+    package.connect = connect_to_one_that_is_silent
+    with pytest.raises(NotConnectedError, match="does not answer: unplugged"):
+        pipython_stages.PiUnit(stage, package)
+    assert devices(package)[0].axes.calls == ["close"]
+
+
+def test_the_line_to_a_controller_that_pipython_does_not_know_is_closed(monkeypatch):
+    closed = []
+
+    class Socket:
+        def __init__(self, host, port):
+            assert (host, port) == ("192.168.0.5", 50_000)
+
+        def close(self):
+            closed.append(self)
+
+    def refuse(_controller, gateway):
+        raise KeyError(f"no such controller, over {gateway}")
+
+    package, lines = ModuleType("pipython"), ModuleType("pisocket")
+    package.__version__, package.GCSError, package.GCSDevice = "2.11.0", GCSError, refuse
+    lines.PISocket = Socket
+    monkeypatch.setitem(sys.modules, "pipython", package)
+    monkeypatch.setitem(sys.modules, "pipython.pidevice.interfaces.pisocket", lines)
+    options = {"serial": 1, "controller": "C-0", "connect": "tcpip", "at": "192.168.0.5"}
+    stage = pipython_stages.PiStage.model_validate({**options, "axes": [{"axis": 1}]})
+    with pytest.raises(NotConnectedError, match="no such controller"):
+        pipython_stages.PiUnit(stage, pipython_stages.InstalledPackage())
+    assert len(closed) == 1
+
+
+def test_devices_that_were_open_already_are_closed_when_a_later_one_fails():
+    package = FakePylablib()
+    stage = package.controller_options().stages[0]
+
+    def failing():
+        raise DeviceError("this firmware is too old", fault=DeviceFault.UNSUPPORTED)
+
+    opens = [lambda: pylablib_stages.PylablibUnit(stage, package), failing]
+    with pytest.raises(DeviceError, match="too old"):
+        StageController("stages", opens).open()
+    assert devices(package)[0].axes.calls[-1] == "close"
 
 
 @pytest.mark.parametrize(

@@ -423,6 +423,18 @@ def test_types_with_a_mark_find_it_from_both_sides(safe_direction: int, start: i
         assert (min(seen) == -6000.0) == (start < 0)
 
 
+@pytest.mark.parametrize("code", [31, 33, 34, 35])
+def test_goniometers_with_end_stop_reference_are_referenced_there(code: int) -> None:
+    client = in_the_middle()
+    client.ok("SetSensorType_A", 0, 0, code)
+    client.ok("CalibrateSensor_A", 0, 0)
+    client.until(COMPLETED)
+    client.ok("MoveToReference_A", 0, 0, 0, 0)
+    client.until(COMPLETED)
+    assert known(client) == 1
+    assert abs(client.truth()) == pytest.approx(6000.0, abs=5.0)
+
+
 def test_a_mark_that_cannot_be_reached_fails_the_reference() -> None:
     client = in_the_middle()
     client.ok("MovePositionAbsolute_A", 0, 0, -30_000, 0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from cosmic.daqco.hw.interface import Board, BoardChunk, InputSettings, OverrunError, Volts
 from cosmic.frame.clock import WALL
-from cosmic.frame.errors import DeviceError, DeviceFault, only_cosmic_errors
+from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, only_cosmic_errors
 
 logger = logging.getLogger(__name__)
 
@@ -129,9 +129,11 @@ class BoardGroup:
             for board in in_order:
                 with only_cosmic_errors(board.info.name):
                     board.start()
-        except DeviceError:
+        except CosmicError as exc:
             self.stop()
-            raise
+            if isinstance(exc, DeviceError):
+                raise
+            raise DeviceError(str(exc)) from exc  # of a board that somebody brought
 
     def receive(self, timeout_s: float) -> BoardChunk | None:
         """Return the next chunk of all boards, or None after `timeout_s` of wall time.
@@ -156,9 +158,11 @@ class BoardGroup:
             if len(self._pieces) < len(self._boards):
                 return None
             return self._joined(self._whole_pieces())
-        except DeviceError:
+        except CosmicError as exc:
             self.stop()
-            raise
+            if isinstance(exc, DeviceError):
+                raise
+            raise DeviceError(str(exc)) from exc  # of a board that somebody brought
 
     def _piece(self, number: int, wait_s: float) -> BoardChunk | None:
         """Return the next chunk of one board; raises `DeviceError`, also where it is none."""

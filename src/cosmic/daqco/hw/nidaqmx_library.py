@@ -122,11 +122,13 @@ class NidaqmxLibrary(BoardLibrary):
 
 
 def _info(device: Any) -> BoardInfo | None:
-    """Return what a device is; None when it has no analogue inputs."""
+    """Return what a device is; None when it has no analogue inputs for voltages."""
     inputs = tuple(_short(each.name) for each in device.ai_physical_chans)
     if not inputs:
         return None
     flat = [float(end) for end in device.ai_voltage_rngs]
+    if not flat:
+        return None  # a module for currents, or thermocouples
     ranges = sorted(zip(flat[::2], flat[1::2], strict=True), key=lambda pair: pair[0] - pair[1])
     return BoardInfo(
         name=str(device.name),

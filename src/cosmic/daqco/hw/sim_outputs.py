@@ -210,6 +210,7 @@ class SimulatedOutputs(BoardOutputs):
 
     @override
     def close(self) -> None:
+        self.end_waveform()
         self._closed = True
 
     def _level(self, output: str, call: str) -> OutputLevel:

@@ -7,7 +7,7 @@ comes of them arrives as events from `Controller.receive`.
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Protocol
 
@@ -79,7 +79,7 @@ class PositionerType:
     name : str
         The vendor's name for it.
     kind : PositionerKind or None
-        None when CoSMic does not know this type.
+        None when CoSMic does not know this type, or cannot foresee where it goes.
     reference : ReferenceKind
         How it can be referenced.
     driver : str
@@ -92,6 +92,15 @@ class PositionerType:
     kind: PositionerKind | None
     reference: ReferenceKind
     driver: str = ""
+
+    def counted_backwards(self) -> "PositionerType":
+        """Return what it is while its scale is inverted in the controller: nothing to be moved.
+
+        Positions run the other way then, and steps and searches for an end do not: where they
+        lead could not be foreseen.
+        """
+        name = f"{self.name}, its scale inverted in the controller (undo that with its own tool)"
+        return replace(self, name=name, kind=None)
 
 
 Serial = int | str

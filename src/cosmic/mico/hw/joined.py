@@ -10,6 +10,7 @@ from typing import TypeVar, get_args
 from typing_extensions import override
 
 from cosmic.frame.errors import (
+    CosmicError,
     DeviceError,
     DeviceFault,
     NotConnectedError,
@@ -140,7 +141,7 @@ class JoinedController(Controller):
                 for identity in asked(part, partial(part.open, own)):
                     identities.append(replace(identity, index=len(joined)))
                     joined.append(_JoinedDevice(part, identity.index))
-        except DeviceError:
+        except CosmicError:
             self._close_parts()
             raise
         if not joined:

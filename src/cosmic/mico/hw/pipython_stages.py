@@ -95,7 +95,11 @@ class InstalledPackage(Package):
         else:
             lines = importlib.import_module("pipython.pidevice.interfaces.piserial")
             line = lines.PISerial(options.at, options.baud)
-        return make(options.controller, gateway=line), line.close
+        try:
+            return make(options.controller, gateway=line), line.close
+        except Exception:
+            line.close()
+            raise
 
 
 class PiUnit(StageUnit):
@@ -108,13 +112,13 @@ class PiUnit(StageUnit):
         self._reference = options.reference
         try:
             self._device, self._disconnect = package.connect(options)
+        except self.errors as exc:
+            raise _silent(options, exc) from exc
+        try:
             said = str(self._device.qIDN())
         except self.errors as exc:
-            raise NotConnectedError(
-                f"PI {options.controller} at {options.at!r} ({options.connect}) does not answer: "
-                f"{exc}; check power, cable and that no other program uses it",
-                fault=DeviceFault.COMMUNICATION,
-            ) from exc
+            self._disconnect()  # else nobody could connect to it again
+            raise _silent(options, exc) from exc
         found = re.search(r"\d+\.\d+\.\d+", said.rpartition(",")[2])
         self.firmware = found.group() if found else "0.0.0"
 
@@ -183,6 +187,14 @@ class PiUnit(StageUnit):
             return DeviceFault.OTHER
         line = DeviceFault.COMMUNICATION if code in _LINE_ERRORS else DeviceFault.OTHER
         return _FAULTS.get(code, line)
+
+
+def _silent(options: PiStage, exc: Exception) -> NotConnectedError:
+    return NotConnectedError(
+        f"PI {options.controller} at {options.at!r} ({options.connect}) does not answer: "
+        f"{exc}; check power, cable and that no other program uses it",
+        fault=DeviceFault.COMMUNICATION,
+    )
 
 
 def make_controller(options: PiOptions, package: Package) -> StageController:

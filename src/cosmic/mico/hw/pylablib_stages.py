@@ -122,7 +122,8 @@ class PylablibUnit(StageUnit):
         needed = _NEEDED + _NEEDED_WITH_SENSOR * sensor
         missing = [name for name in needed if not self._has(name)]
         if missing:
-            self._device.close()
+            if "close" not in missing:
+                self._device.close()
             raise NotConnectedError(
                 f"{options.device} has no {', '.join(missing)}: what cannot be stopped, or does "
                 "not say whether it moves, is not driven",

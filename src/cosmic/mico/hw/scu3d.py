@@ -24,6 +24,7 @@ from cosmic.mico.hw.interface import (
     Direction,
     Event,
     Serial,
+    TypeRead,
 )
 from cosmic.mico.hw.scu3d_errors import nothing_found, require_serials, status_error
 from cosmic.mico.hw.scu3d_events import event_from_packet
@@ -44,6 +45,7 @@ _MOVES: Final = {
 _FIRST_LIST_SIZE: Final = 16
 _LARGEST_LIST_SIZE: Final = 4096
 _INDEX_MAX: Final = 2**32 - 1
+_INVERTED: Final = 1
 
 
 class Scu3dController(Controller):
@@ -69,7 +71,9 @@ class Scu3dController(Controller):
         self._lifecycle = threading.Lock()
         self._opened = False
         self._serials: dict[int, Serial] = {}
+        self._inverted: set[Channel] = set()
         self._position_known = self._library.has("SA_GetPhysicalPositionKnown_A")
+        self._knows_scale = self._library.has("SA_GetScale_A")
         self._library.has("SA_Stop_A")  # bound now, so that the first stop is not the slowest
 
     @property
@@ -125,6 +129,7 @@ class Scu3dController(Controller):
                 self._release()
                 raise
             self._serials = {device.index: device.serial for device in devices}
+            self._inverted.clear()
             self._opened = True
         logger.info("%s opened with devices %s", self.name, [d.serial for d in devices])
         return devices
@@ -144,6 +149,11 @@ class Scu3dController(Controller):
         if status != sa.SA_OK:
             self._checked(status, "SA_ReceiveNextPacket_A", device=device)
         event = event_from_packet(device, packet, serial=self._serials.get(device))
+        if packet.packetType == sa.SA_SCALE_PACKET_TYPE:
+            self._learn_scale(Channel(device, packet.channelIndex), packet.data1)
+            return None  # asked for with the type, whose answer comes next
+        if isinstance(event, TypeRead) and event.channel in self._inverted:
+            event = TypeRead(event.channel, event.positioner.counted_backwards())
         if event is not None and logger.isEnabledFor(logging.DEBUG):
             logger.debug("device %d: %s", device, event)
         return event
@@ -158,6 +168,8 @@ class Scu3dController(Controller):
 
     @override
     def ask_type(self, channel: Channel) -> None:
+        if self._knows_scale:  # its answer comes before the other one
+            self._send(channel, "SA_GetScale_A")
         self._send(channel, "SA_GetSensorType_A")
 
     @override
@@ -226,6 +238,10 @@ class Scu3dController(Controller):
     @override
     def stop(self, channel: Channel) -> None:
         self._send(channel, "SA_Stop_A")
+
+    def _learn_scale(self, at: Channel, inverted: int) -> None:
+        # That the inversion is data1 stands in the manual of the sister product: only 1 counts.
+        (self._inverted.add if inverted == _INVERTED else self._inverted.discard)(at)
 
     def _move(
         self, channel: Channel, call: str, value: float, unit: AxisUnit, *, hold_s: float

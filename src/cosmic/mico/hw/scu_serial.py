@@ -24,6 +24,7 @@ from cosmic.mico.hw.interface import (
     Direction,
     Event,
     Serial,
+    TypeRead,
 )
 from cosmic.mico.hw.scu_serial_unit import CHANNELS, SerialLike, Unit
 
@@ -83,6 +84,7 @@ class ScuSerialController(Controller):
         self._simulated = simulated
         self._lifecycle = threading.Lock()
         self._units: tuple[Unit, ...] = ()
+        self._inverted: set[Channel] = set()
 
     @property
     @override
@@ -172,10 +174,16 @@ class ScuSerialController(Controller):
             for unit in (found[each] for each in found if each not in wanted):
                 unit.close()
             units = tuple(found[each] for each in wanted)
-            for index, unit in enumerate(units):
-                unit.index = index
-                self._guard(unit)
+            try:
+                for index, unit in enumerate(units):
+                    unit.index = index
+                    self._guard(unit)
+            except DeviceError:
+                for unit in units:
+                    unit.close()
+                raise
             self._units = units
+            self._inverted.clear()
         logger.info("%s opened with units %s", self.name, wanted)
         return tuple(
             DeviceIdentity(index, unit.serial, unit.firmware) for index, unit in enumerate(units)
@@ -206,6 +214,12 @@ class ScuSerialController(Controller):
                 f"a wait must be finite and not negative, got {timeout_s!r} s", none="SCU"
             )
         event = unit.receive(timeout_s)
+        if isinstance(event, text.ScaleRead) and event.channel is not None:
+            learn = self._inverted.add if event.inverted else self._inverted.discard
+            learn(event.channel)
+            return None  # asked for with the type, whose answer comes next
+        if isinstance(event, TypeRead) and event.channel in self._inverted:
+            event = TypeRead(event.channel, event.positioner.counted_backwards())
         if event is not None and logger.isEnabledFor(logging.DEBUG):
             logger.debug("device %d: %s", device, event)
         return event
@@ -223,7 +237,9 @@ class ScuSerialController(Controller):
 
     @override
     def ask_type(self, channel: Channel) -> None:
-        self._at(channel).ask(channel, text.TYPE)
+        unit = self._at(channel)
+        unit.ask(channel, text.SCALE)
+        unit.ask(channel, text.TYPE)
 
     @override
     def ask_position_known(self, channel: Channel) -> None:

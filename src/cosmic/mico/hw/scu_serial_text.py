@@ -22,6 +22,7 @@ from cosmic.mico.hw.interface import (
     Direction,
     Event,
     Failed,
+    OtherAnswer,
     PositionKnownRead,
     PositionRead,
     SafeDirectionRead,
@@ -172,8 +173,20 @@ class Question:
         return None if found is None else self.make(at, found.groups())
 
 
+@dataclass(frozen=True, slots=True)
+class ScaleRead(OtherAnswer):
+    """What an axis counts from, and whether it counts backwards."""
+
+    inverted: bool = False
+
+
 SENSOR_PRESENT: Final = Question(
     "GSP", "SP{}([PN])", lambda at, said: SensorPresentRead(at, present=said[0] == "P")
+)
+SCALE: Final = Question(
+    "GSC",
+    r"SC{}I([01])S(-?\d+)",
+    lambda at, said: ScaleRead(at, f"scale: {said[1]}", inverted=said[0] == "1"),
 )
 TYPE: Final = Question(
     "GST", r"ST{}T(\d+)", lambda at, said: TypeRead(at, positioner_type(int(said[0])))

@@ -158,7 +158,9 @@ class Unit:
     def _sendable(self) -> Iterator[Line]:
         while self._urgent:
             stop = self._urgent.popleft()
-            dropped = [each for each in self._commands if each.moves and each.at == stop.at]
+            # A copy, made in one go: other threads add to the queue meanwhile.
+            waiting = tuple(self._commands)
+            dropped = [each for each in waiting if each.moves and each.at == stop.at]
             for each in dropped:
                 logger.info("%s: %s was not sent: a stop came first", self.name, each.said)
                 self._commands.remove(each)

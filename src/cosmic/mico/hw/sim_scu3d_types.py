@@ -70,7 +70,7 @@ _LETTERS: Final = {
     11: (_ROTARY, "E"),
     12: (_ROTARY, "-"),
     13: (_ROTARY, "E"),
-    # later ones; the tip-tilts' reference and which of 30-35 are S or E is a guess
+    # later ones; the reference of the tip-tilts and of what only 1.5.16 knows (38-41) is a guess
     14: (_LINEAR, "E"),
     15: (_GONIO, "E"),
     16: (_LINEAR, "E"),
@@ -84,9 +84,10 @@ _LETTERS: Final = {
     24: (_LINEAR, "E"),
     **dict.fromkeys((25, 26, 27, 28), (_LINEAR, "E")),
     **dict.fromkeys((29, 37), (_ROTARY, "E")),
-    **dict.fromkeys((30, 32, 34), (_GONIO, "M")),
-    **dict.fromkeys((31, 33, 35), (_GONIO, "E")),
-    **dict.fromkeys((36, 38, 39, 40, 41), (_ROTARY, "M")),
+    **dict.fromkeys((30, 32), (_GONIO, "M")),
+    **dict.fromkeys((31, 33, 34, 35), (_GONIO, "E")),
+    **dict.fromkeys((36, 38), (_ROTARY, "M")),
+    **dict.fromkeys((39, 40, 41), (_ROTARY, "E")),
 }
 
 TYPES: Final[dict[int, tuple[Movement, Reference]]] = {

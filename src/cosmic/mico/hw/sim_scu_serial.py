@@ -9,6 +9,7 @@ from threading import Condition
 from typing import Final
 
 from cosmic.frame.clock import Clock, RatedClock
+from cosmic.frame.errors import DeviceFault, NotConnectedError
 from cosmic.mico.hw.sim_device import LibraryLock
 from cosmic.mico.hw.sim_faults import Faults
 from cosmic.mico.hw.sim_scu3d_device import Device
@@ -112,10 +113,13 @@ class SimulatedUnit:
 
     def _go_on(self, now_s: float) -> None:
         """Let happen what is due, and say what of it is to be reported."""
-        if 0.0 < self._settings.keep_alive_s < now_s - self._heard_s:
+        over_s = self._heard_s + self._settings.keep_alive_s
+        if self._settings.keep_alive_s > 0.0 and over_s < now_s:
+            # It stopped then, though nobody looks before now.
             self._heard_s = now_s
+            self._device.advance(over_s)
             for channel in self._device.channels:
-                channel.stop(now_s)
+                channel.stop(over_s)
         self._device.advance(now_s)
         while (packet := self._device.queue.head(now_s)) is not None:
             self._device.queue.pop(now_s)
@@ -231,8 +235,16 @@ class SimulatedScus:
             self.faults.wire(unit.device, unit.changed)
 
     def open_port(self, name: str) -> SimulatedLine:
-        """Return the line to the unit of this number; raises `OSError` where it is unplugged."""
+        """Return the line to the unit of this number.
+
+        Raises
+        ------
+        NotConnectedError
+            It is unplugged.
+        """
         unit = self.units[int(name)]
         if unit.unplugged:
-            raise OSError("the simulated line is not there")
+            raise NotConnectedError(
+                f"the simulated line {name} is not there", fault=DeviceFault.COMMUNICATION
+            )
         return SimulatedLine(unit)

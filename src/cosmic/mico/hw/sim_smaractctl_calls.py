@@ -69,12 +69,14 @@ def _value_out(dtype: int, value: properties.Value, out: Any, size: Any) -> int:
 
 
 def _given(value: Any) -> properties.Value:
+    if value is None:
+        raise Refused(sa.SA_CTL_ERROR_INVALID_PARAMETER)  # no text
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else int(value)
 
 
 def _plugged(session: Session, handle: int) -> Device:
     device = session.device(handle)
-    if device.unplugged:
+    if device.disconnected:
         raise Refused(sa.SA_CTL_ERROR_COMMUNICATION_FAILED)
     return device
 
@@ -148,7 +150,7 @@ def _request_functions(session: Session) -> dict[str, Body]:
                 return sa.SA_CTL_ERROR_INVALID_PARAMETER
             now_s = session.clock.now_s()
             device.advance(now_s)
-            number[0] = asked = device.ask(key, writes=False)
+            number[0] = asked = device.ask(key, transmission, writes=False)
 
             def act(request: Request, at_s: float) -> None:
                 request.dtype, request.value = properties.read(device, index, key, at_s)
@@ -203,7 +205,7 @@ def _writing(session: Session, kind: str) -> Body:
             device.advance(now_s)
             asked = -1
             if number:
-                number[0] = asked = device.ask(key, writes=True)
+                number[0] = asked = device.ask(key, transmission, writes=True)
             _submit(device, asked, index, act, transmission, now_s)
         return sa.SA_CTL_ERROR_NONE
 
@@ -256,7 +258,7 @@ def _answer(session: Session, handle: int, number: int, *, writes: bool) -> Requ
             now_s = clock.now_s()
             if request.due_s is not None and request.due_s <= now_s:
                 return device.requests.pop(number)
-            if device.unplugged:
+            if device.disconnected:
                 raise Refused(sa.SA_CTL_ERROR_COMMUNICATION_FAILED)
             if request.due_s is None and now_s >= deadline_s:
                 raise Refused(sa.SA_CTL_ERROR_TIMEOUT)
@@ -341,7 +343,8 @@ def _transmission_functions(session: Session) -> dict[str, Body]:
         device = session.device(handle)
         with device.changed:
             _require(device, transmission, group=group)
-            del device.transmissions[transmission]
+            device.drop(transmission)
+            device.changed.notify_all()
         return sa.SA_CTL_ERROR_NONE
 
     def no_stream(handle: int, *_args: Any) -> int:
@@ -371,13 +374,14 @@ def _waiting(session: Session) -> Body:
         if not event:
             return sa.SA_CTL_ERROR_INVALID_PARAMETER
         with device.changed:
-            if device.waiting:
+            if device.waiting == handle:
                 return sa.SA_CTL_ERROR_THREAD_LIMIT_REACHED
-            device.waiting = True
+            device.waiting = handle
             try:
                 packet = _next_event(session, device, handle, timeout_ms)
             finally:
-                device.waiting = False
+                if device.waiting == handle:  # it may be open again, and waited for
+                    device.waiting = 0
         session.scene.keep_up()  # with no lock held
         out = event[0]
         out.type, index, value = packet[0], packet[1], packet[2]
@@ -403,7 +407,9 @@ def _next_event(
     deadline_s = clock.now_s() + wait_s * (clock.rate or 1.0)
     wall_s = WALL.now_s() + wait_s
     while True:
-        if device.handle != handle or device.cancelled:
+        if device.handle != handle:
+            raise Refused(sa.SA_CTL_ERROR_CANCELED)
+        if device.cancelled:
             device.cancelled = False
             raise Refused(sa.SA_CTL_ERROR_CANCELED)
         now_s = clock.now_s()
@@ -412,7 +418,7 @@ def _next_event(
         if head is not None:
             device.queue.pop(now_s)
             return head
-        if device.unplugged:
+        if device.disconnected:
             raise Refused(sa.SA_CTL_ERROR_COMMUNICATION_FAILED)
         if now_s >= deadline_s or WALL.now_s() >= wall_s:
             raise Refused(sa.SA_CTL_ERROR_TIMEOUT)

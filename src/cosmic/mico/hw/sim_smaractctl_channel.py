@@ -103,6 +103,11 @@ class Channel(SimulatedChannel):
         """Whether the sensor has power."""
         return self.value(sa.SA_CTL_PKEY_SENSOR_POWER_MODE) != sa.SA_CTL_SENSOR_MODE_DISABLED
 
+    @property
+    def amplifier_on(self) -> bool:
+        """Whether anything can move."""
+        return bool(self.value(sa.SA_CTL_PKEY_AMPLIFIER_ENABLED))
+
     def require_sensor(self) -> None:
         """Refuse what needs a sensor where there is none, or where it is off."""
         if not self.sensor_present:
@@ -113,8 +118,9 @@ class Channel(SimulatedChannel):
     @property
     def state(self) -> int:
         """Its state as the library answers it."""
-        bits = int(self.phase) | self.marks | sa.SA_CTL_CH_STATE_BIT_AMPLIFIER_ENABLED
+        bits = int(self.phase) | self.marks
         for bit, given in (
+            (sa.SA_CTL_CH_STATE_BIT_AMPLIFIER_ENABLED, self.amplifier_on),
             (sa.SA_CTL_CH_STATE_BIT_SENSOR_PRESENT, self.sensor_present),
             (sa.SA_CTL_CH_STATE_BIT_IS_CALIBRATED, self.calibrated),
             (sa.SA_CTL_CH_STATE_BIT_IS_REFERENCED, self.referenced),
@@ -158,8 +164,12 @@ class Channel(SimulatedChannel):
 
     def rescale(self) -> None:
         """Let a new offset or inversion act; without a reference it waits for one."""
-        if self.referenced:
-            self.find_reference(self._origin)
+        if not self.referenced:
+            return
+        aimed = None if self.target is None else self.position(self.target)
+        self.find_reference(self._origin)
+        # Where it is to stand does not change, only what that is called.
+        self.target = None if aimed is None else self.logical(aimed)
 
     def forget(self, now_s: float) -> None:
         """Lose calibration and reference, as a new positioner type makes it."""
@@ -230,6 +240,8 @@ class Channel(SimulatedChannel):
             raise Refused(sa.SA_CTL_ERROR_OVER_TEMPERATURE)
         if self.fault("hv_range"):
             raise Refused(sa.SA_CTL_ERROR_POWER_SUPPLY_DISABLED)
+        if not self.amplifier_on:
+            raise Refused(sa.SA_CTL_ERROR_AMPLIFIER_DISABLED)
         self._turns.clear()
         self._ramping = False
         self.marks &= ~(_STOPPED_MARKS | sa.SA_CTL_CH_STATE_BIT_MOVEMENT_FAILED)

@@ -39,6 +39,8 @@ class Request:
     ----------
     due_s : float or None
         When the answer is there; None while it was not sent.
+    transmission : int
+        The buffer or group that it waits in; 0 for none.
     code : int
         Result of it.
     """
@@ -46,6 +48,7 @@ class Request:
     key: int
     writes: bool
     due_s: float | None = None
+    transmission: int = 0
     code: int = 0
     dtype: int = sa.SA_CTL_DTYPE_NONE
     value: properties.Value = 0
@@ -88,8 +91,9 @@ class Device(SimulatedDevice[Channel]):
         self.random = random.Random(f"mcs2 {number} {scene.seed}")
         self.values: dict[int, int] = {}
         self.handle = 0
-        self.waiting = False
+        self.waiting = 0
         self.cancelled = False
+        self._lost = False
         self.requests: dict[int, Request] = {}
         self.transmissions: dict[int, Transmission] = {}
         self._next_transmission = 1
@@ -122,6 +126,11 @@ class Device(SimulatedDevice[Channel]):
             raise Refused(sa.SA_CTL_ERROR_INVALID_CHANNEL_INDEX)
         return self.channels[index]
 
+    @property
+    def disconnected(self) -> bool:
+        """Whether the client reaches nothing: also once the cable is in again, until it closes."""
+        return self._lost or self.unplugged
+
     def latency_s(self, channel: int | None = None) -> float:
         """Return how long an answer takes."""
         low, high = self.settings.packet_latency_low_s, self.settings.packet_latency_high_s
@@ -137,7 +146,9 @@ class Device(SimulatedDevice[Channel]):
         """Start to work for a client; nothing moves, nothing stops."""
         self.close()
         self.handle = handle
-        self.values.pop(sa.SA_CTL_PKEY_EVENT_NOTIFICATION_OPTIONS, None)
+        self._lost = False
+        for key in (sa.SA_CTL_PKEY_EVENT_NOTIFICATION_OPTIONS, sa.SA_CTL_PKEY_AUTO_RECONNECT):
+            self.values.pop(key, None)
 
     def close(self) -> None:
         """Forget the client; the channels go on with what they do."""
@@ -176,11 +187,20 @@ class Device(SimulatedDevice[Channel]):
         if not kept.commands:
             raise Refused(sa.SA_CTL_ERROR_BUFFER_EMPTY)
         del self.transmissions[handle]
+        for request in self.requests.values():
+            if request.transmission == handle:
+                request.transmission = 0  # the number of a buffer is used again
         for command in kept.commands:
             command(now_s)
         if kept.group:
             value = handle << 24
             self.post(sa.SA_CTL_EVENT_CMD_GROUP_TRIGGERED, DEVICE_INDEX, value, now_s)
+
+    def drop(self, handle: int) -> None:
+        """Forget what was kept, and what was asked with it."""
+        del self.transmissions[handle]
+        kept = self.requests.items()
+        self.requests = {n: each for n, each in kept if each.transmission != handle}
 
     def movement(self, index: int, start: Callable[[Channel, float], None]) -> Command:
         """Return the command that starts a movement; a refusal comes as its end."""
@@ -201,13 +221,15 @@ class Device(SimulatedDevice[Channel]):
 
     # Requests
 
-    def ask(self, key: int, *, writes: bool) -> int:
-        """Return the number of a new request; raises `Refused` when there are too many."""
+    def ask(self, key: int, transmission: int, *, writes: bool) -> int:
+        """Return the number of a new request; raises `Refused`, also when there are too many."""
+        if transmission:
+            self.transmission(transmission)
         for _ in range(sa.SA_CTL_REQUEST_ID_MAX_COUNT):
             number = self._next_request
             self._next_request = (number + 1) % sa.SA_CTL_REQUEST_ID_MAX_COUNT
             if number not in self.requests:
-                self.requests[number] = Request(key, writes)
+                self.requests[number] = Request(key, writes, transmission=transmission)
                 return number
         raise Refused(sa.SA_CTL_ERROR_BUFFER_LIMIT_REACHED)
 
@@ -236,6 +258,7 @@ class Device(SimulatedDevice[Channel]):
     def on_inject(self, fault: Fault, now_s: float) -> None:
         self.advance(now_s)
         if fault.name == "unplugged":
+            self._lost = not self.values.get(sa.SA_CTL_PKEY_AUTO_RECONNECT)
             self.queue.push((sa.SA_CTL_EVENT_CONNECTION_LOST, DEVICE_INDEX, 0, 0, 0), now_s)
         super().on_inject(fault, now_s)
 

@@ -10,6 +10,8 @@ from cosmic.mico.hw.sim_smaractctl_types import TYPE_NAMES, Phase, Refused, Turn
 from cosmic.twin.stage import Route
 
 MOST_STEPS: Final = 100_000
+FARTHEST: Final = 10**14
+"""No target lies farther away, pm or n-degree."""
 FULL_SCAN: Final = 65_535
 RESIDUAL_PART: Final = 0.15
 """With its speed controlled, a stage ends so much nearer than its target threshold."""
@@ -50,7 +52,19 @@ def _within_range(channel: Channel, now_s: float, target: int) -> int:
     return here if (here - border) * (target - border) > 0 else border
 
 
+def _range_limit_reached(time_s: float) -> Turn:
+    """Return the end of a movement at the border of the range that is set."""
+    return Turn(
+        time_s,
+        Phase.STOPPED,
+        result=sa.SA_CTL_ERROR_RANGE_LIMIT_REACHED,
+        marks=sa.SA_CTL_CH_STATE_BIT_RANGE_LIMIT_REACHED,
+    )
+
+
 def _drive(channel: Channel, now_s: float, wanted: int) -> None:
+    if abs(wanted) > FARTHEST:
+        raise Refused(sa.SA_CTL_ERROR_INVALID_PARAMETER)
     target = _within_range(channel, now_s, wanted)
     route = channel.begin(now_s)
     channel.target = wanted
@@ -69,12 +83,7 @@ def _drive(channel: Channel, now_s: float, wanted: int) -> None:
         route.wait(channel.settings.stall_s)
         channel.launch(route, [start, stalled(route.end_s)], now_s=now_s, held_until_s=route.end_s)
     elif target != wanted:
-        over = Turn(
-            route.end_s,
-            Phase.STOPPED,
-            result=sa.SA_CTL_ERROR_RANGE_LIMIT_REACHED,
-            marks=sa.SA_CTL_CH_STATE_BIT_RANGE_LIMIT_REACHED,
-        )
+        over = _range_limit_reached(route.end_s)
         channel.launch(route, [start, over], now_s=now_s, held_until_s=route.end_s)
     else:
         part = RESIDUAL_PART if channel.velocity > 0.0 else 1.0
@@ -175,15 +184,25 @@ def _step(channel: Channel, now_s: float, value: int) -> None:
     travel = channel.stage.noisy_steps(value, volts)
     duration_s = abs(value) / hertz
     channel.obstruct_if_faulty(route.position, route.position + travel)
-    if travel:
-        route.go(route.position + travel, abs(travel) / duration_s)
+    goal = route.position + travel
+    border = _border_of_range(channel, now_s, goal)
+    arrived = not travel or route.go(goal if border is None else border, abs(travel) / duration_s)
+    over = Turn(now_s + duration_s, Phase.STOPPED, result=sa.SA_CTL_ERROR_NONE)
+    if border is not None and arrived:
+        over = _range_limit_reached(route.end_s)
     # At a stop the slider slips: the steps run out where it stands.
-    route.wait(max(now_s + duration_s - route.end_s, 0.0))
-    turns = [
-        Turn(now_s, Phase.OPEN_LOOP),
-        Turn(now_s + duration_s, Phase.STOPPED, result=sa.SA_CTL_ERROR_NONE),
-    ]
-    channel.launch(route, turns, now_s=now_s, held_until_s=now_s + duration_s)
+    route.wait(max(over.time_s - route.end_s, 0.0))
+    turns = [Turn(now_s, Phase.OPEN_LOOP), over]
+    channel.launch(route, turns, now_s=now_s, held_until_s=over.time_s)
+
+
+def _border_of_range(channel: Channel, now_s: float, goal: float) -> float | None:
+    """Return where the range that is set ends before `goal`; None where it does not."""
+    if not (channel.sensor_present and channel.sensor_on):
+        return None  # nobody knows where it is
+    wanted = channel.logical(goal)
+    target = _within_range(channel, now_s, wanted)
+    return None if target == wanted else channel.position(target)
 
 
 def _scan_to(channel: Channel, now_s: float, value: int) -> None:
@@ -262,14 +281,29 @@ def _find_mark(channel: Channel, route: Route, speed: float) -> float | None:
     options = channel.value(sa.SA_CTL_PKEY_REFERENCING_OPTIONS)
     backward = options & sa.SA_CTL_REF_OPT_BIT_START_DIR
     mark = kind.reference_mark + error
-    ahead = route.position - mark if backward else mark - route.position
-    if ahead < 0.0:
+    low, high = _ends(channel)
+    first, second = (low, high) if backward else (high, low)
+    if not min(route.position, first) <= mark <= max(route.position, first):
+        # Nothing on the way there: turn round, once.
+        route.go(first, speed)
         if options & sa.SA_CTL_REF_OPT_BIT_ABORT_ON_ENDSTOP:
-            route.go(kind.low if backward else kind.high, speed)
             return None
-        route.go(kind.low if backward else kind.high, speed)
         route.wait(channel.settings.stall_s)
+        if not low <= mark <= high:
+            route.go(second, speed)
+            return None
     return route.position if route.go(mark, speed) else None
+
+
+def _ends(channel: Channel) -> tuple[float, float]:
+    """Return between which positions a reference is looked for: end stops, or the range set."""
+    kind = channel.stage.kind
+    low = channel.value(sa.SA_CTL_PKEY_RANGE_LIMIT_MIN)
+    high = channel.value(sa.SA_CTL_PKEY_RANGE_LIMIT_MAX)
+    if high <= low:
+        return kind.low, kind.high
+    ends = sorted((channel.position(low), channel.position(high)))
+    return max(ends[0], kind.low), min(ends[1], kind.high)
 
 
 def _find_coded_marks(channel: Channel, route: Route, speed: float) -> float | None:

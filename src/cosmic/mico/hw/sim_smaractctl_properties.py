@@ -6,7 +6,7 @@ from typing import Final, Generic, Protocol, TypeVar
 
 from cosmic.mico.hw import smaractctl_ctypes as sa
 from cosmic.mico.hw.sim_smaractctl_channel import NOTHING_MOVES, Channel
-from cosmic.mico.hw.sim_smaractctl_types import TYPE_NAMES, WRITABLE_TYPES, Refused
+from cosmic.mico.hw.sim_smaractctl_types import TYPE_NAMES, WRITABLE_TYPES, Phase, Refused
 from cosmic.twin.settings import ControllerSettings
 
 I32: Final = sa.SA_CTL_DTYPE_INT32
@@ -98,8 +98,14 @@ def _set_scale(key: int) -> Callable[[Channel, Value, float], None]:
 
 def _set_power(channel: Channel, value: Value, now_s: float) -> None:
     channel.values[sa.SA_CTL_PKEY_SENSOR_POWER_MODE] = int(value)
-    if value == sa.SA_CTL_SENSOR_MODE_DISABLED:
+    if value == sa.SA_CTL_SENSOR_MODE_DISABLED and channel.phase is not Phase.OPEN_LOOP:
         channel.interrupt(sa.SA_CTL_ERROR_SENSOR_DISABLED, now_s)
+
+
+def _set_amplifier(channel: Channel, value: Value, now_s: float) -> None:
+    channel.values[sa.SA_CTL_PKEY_AMPLIFIER_ENABLED] = int(value)
+    if not value:
+        channel.interrupt(sa.SA_CTL_ERROR_AMPLIFIER_DISABLED, now_s)
 
 
 def _read_target(channel: Channel, now_s: float) -> int:
@@ -146,6 +152,7 @@ class PropertyHolder(Protocol):
 
 _VELOCITY: Final = _kept(sa.SA_CTL_PKEY_MOVE_VELOCITY, I64, 0, 0, 10**11)
 _POWER: Final = _kept(sa.SA_CTL_PKEY_SENSOR_POWER_MODE, I32, 1, 0, 2)
+_AMPLIFIER: Final = _kept(sa.SA_CTL_PKEY_AMPLIFIER_ENABLED, I32, 1, 0, 1)
 _OFFSET: Final = sa.SA_CTL_PKEY_LOGICAL_SCALE_OFFSET
 _INVERSION: Final = sa.SA_CTL_PKEY_LOGICAL_SCALE_INVERSION
 _STORED: Final[dict[int, tuple[int, int, int, int]]] = {
@@ -165,7 +172,6 @@ _STORED: Final[dict[int, tuple[int, int, int, int]]] = {
     sa.SA_CTL_PKEY_REFERENCING_OPTIONS: (I32, 0, 0, _INT32),
     sa.SA_CTL_PKEY_CALIBRATION_OPTIONS: (I32, 0, 0, 0x1FF),
     sa.SA_CTL_PKEY_SAFE_DIRECTION: (I32, 1, 0, 1),
-    sa.SA_CTL_PKEY_AMPLIFIER_ENABLED: (I32, 1, 0, 1),
     sa.SA_CTL_PKEY_FOLLOWING_ERROR_LIMIT: (I64, 0, 0, _FAR),
     sa.SA_CTL_PKEY_POSITIONER_CONTROL_OPTIONS: (I32, 0, 0, _INT32),
     sa.SA_CTL_PKEY_CONTROL_LOOP_INPUT: (I32, 1, 0, 2),
@@ -208,6 +214,7 @@ CHANNEL: Final[dict[int, Property[Channel]]] = {
     sa.SA_CTL_PKEY_POS_REFERENCE_TYPE: _read_only(I32, _of_type("reference")),
     sa.SA_CTL_PKEY_POS_IS_CUSTOM_TYPE: _read_only(I32, lambda *_: 0),
     sa.SA_CTL_PKEY_SENSOR_POWER_MODE: Property(I32, _POWER.read, _set_power, 1, 0, 2),
+    sa.SA_CTL_PKEY_AMPLIFIER_ENABLED: Property(I32, _AMPLIFIER.read, _set_amplifier, 1, 0, 1),
     sa.SA_CTL_PKEY_FOLLOWING_ERROR: _read_only(I64, lambda *_: 0),
     sa.SA_CTL_PKEY_CHANNEL_ERROR: _read_only(I32, _take_error),
     sa.SA_CTL_PKEY_CHANNEL_TEMPERATURE: _read_only(

@@ -340,6 +340,7 @@ class SmaractCtlController(Controller):
             sa.SA_CTL_PKEY_POSITIONER_TYPE_NAME,
             sa.SA_CTL_PKEY_POS_BASE_UNIT,
             sa.SA_CTL_PKEY_POS_REFERENCE_TYPE,
+            sa.SA_CTL_PKEY_LOGICAL_SCALE_INVERSION,
         )
         self._ask(channel, keys, events.positioner_type)
 
@@ -380,19 +381,16 @@ class SmaractCtlController(Controller):
 
     @override
     def move_to(self, channel: Channel, target: float, unit: AxisUnit, *, hold_s: float) -> None:
-        mode = sa.SA_CTL_MOVE_MODE_CL_ABSOLUTE
-        self._closed_loop(channel, mode, convert.counts(target, unit, channel), hold_s)
+        self._closed_loop(channel, convert.counts(target, unit, channel), hold_s)
 
     @override
     def move_by(self, channel: Channel, distance: float, unit: AxisUnit, *, hold_s: float) -> None:
-        mode = sa.SA_CTL_MOVE_MODE_CL_RELATIVE
-        self._closed_loop(channel, mode, convert.counts(distance, unit, channel), hold_s)
+        self._closed_loop(channel, convert.counts(distance, unit, channel), hold_s, from_here=True)
 
     @override
     def move_to_end_stop(self, channel: Channel, direction: Direction, *, hold_s: float) -> None:
         far = -_FAR if direction is Direction.BACKWARD else _FAR
-        mode = sa.SA_CTL_MOVE_MODE_CL_RELATIVE
-        self._closed_loop(channel, mode, far, hold_s, seeks_end=True)
+        self._closed_loop(channel, far, hold_s, from_here=True, seeks_end=True)
 
     @override
     def move_together(self, moves: Sequence[MatchedMove]) -> None:
@@ -480,14 +478,33 @@ class SmaractCtlController(Controller):
         self._checked(code or again, "SA_CTL_Stop()", at=channel)
 
     def _closed_loop(
-        self, channel: Channel, mode: int, counts: int, hold_s: float, *, seeks_end: bool = False
+        self,
+        channel: Channel,
+        counts: int,
+        hold_s: float,
+        *,
+        from_here: bool = False,
+        seeks_end: bool = False,
     ) -> None:
         writes = [
             *self._speed(channel),
             (sa.SA_CTL_PKEY_HOLD_TIME, convert.hold_ms(hold_s, channel)),
-            (sa.SA_CTL_PKEY_MOVE_MODE, mode),
+            (sa.SA_CTL_PKEY_MOVE_MODE, sa.SA_CTL_MOVE_MODE_CL_ABSOLUTE),
         ]
-        self._move(channel, writes, counts, seeks_end=seeks_end)
+        # The controller's own relative mode adds to the last target, also to one that was never
+        # reached, so that it may go another way than it was told.
+        target = counts + self._here(channel) if from_here else counts
+        self._move(channel, writes, target, seeks_end=seeks_end)
+
+    def _here(self, channel: Channel) -> int:
+        """Return the position; 0 without a sensor, where no movement begins anyway."""
+        at, value, key = self._at(channel, "asking"), c_int64(), sa.SA_CTL_PKEY_POSITION
+        call = "SA_CTL_GetProperty_i64"
+        code = self._library.call(call, at.handle, channel.channel, key, byref(value), None)
+        if code in (sa.SA_CTL_ERROR_NO_SENSOR_PRESENT, sa.SA_CTL_ERROR_SENSOR_DISABLED):
+            return 0
+        self._checked(code, f"{call}(POSITION)", at=channel)
+        return value.value
 
     def _speed(self, channel: Channel) -> list[tuple[int, int]]:
         """Return what sets the speed of the next movement, or takes that of a line back."""
@@ -527,8 +544,13 @@ class SmaractCtlController(Controller):
         self._checked(code, f"{call}{args}", at=channel)
 
     def _write(self, channel: Channel, writes: Writes) -> None:
-        """Write properties one behind the other, then wait until all are acknowledged."""
+        """Write properties one behind the other, then wait until all are acknowledged.
+
+        Each is waited for, whatever became of those before: the library keeps the number of a
+        request until its answer is fetched, and has 240 of them.
+        """
         at = self._at(channel, "writing")
+        codes: list[tuple[int, str]] = []
         numbers: list[tuple[int, int]] = []
         for key, value in writes:
             number = c_uint8()
@@ -537,11 +559,15 @@ class SmaractCtlController(Controller):
             code = self._library.call(
                 call, at.handle, channel.channel, key, value, byref(number), 0
             )
-            self._checked(code, f"{call}({key:#010x}, {value})", at=channel)
+            if code != sa.SA_CTL_ERROR_NONE:
+                codes.append((code, f"{call}({key:#010x}, {value})"))
+                break
             numbers.append((number.value, key))
         for asked, key in numbers:
             code = self._library.call("SA_CTL_WaitForWrite", at.handle, asked)
-            self._checked(code, f"writing {key:#010x}", at=channel)
+            codes.append((code, f"writing {key:#010x}"))
+        for code, call in codes:
+            self._checked(code, call, at=channel)
 
     # Where
 

@@ -94,15 +94,14 @@ def positioner_type(at: Channel, answers: Answers) -> Event:
     """Answer `ask_type`."""
     unit = _UNITS.get(int(answers[sa.SA_CTL_PKEY_POS_BASE_UNIT]))
     reference = int(answers[sa.SA_CTL_PKEY_POS_REFERENCE_TYPE])
-    return TypeRead(
-        at,
-        PositionerType(
-            code=int(answers[sa.SA_CTL_PKEY_POSITIONER_TYPE]),
-            name=str(answers[sa.SA_CTL_PKEY_POSITIONER_TYPE_NAME]),
-            kind=None if unit is None else unit[1],
-            reference=_REFERENCES.get(reference, ReferenceKind.NONE),
-        ),
+    found = PositionerType(
+        code=int(answers[sa.SA_CTL_PKEY_POSITIONER_TYPE]),
+        name=str(answers[sa.SA_CTL_PKEY_POSITIONER_TYPE_NAME]),
+        kind=None if unit is None else unit[1],
+        reference=_REFERENCES.get(reference, ReferenceKind.NONE),
     )
+    inverted = answers[sa.SA_CTL_PKEY_LOGICAL_SCALE_INVERSION] != sa.SA_CTL_NON_INVERTED
+    return TypeRead(at, found.counted_backwards() if inverted else found)
 
 
 def position_in(wanted: AxisUnit) -> Callable[[Channel, Answers], Event]:

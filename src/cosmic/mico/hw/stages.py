@@ -322,6 +322,8 @@ class StageController(Controller):
             except NotConnectedError as exc:
                 logger.warning("%s", exc)
             except DeviceError:
+                for unit in units:
+                    _close(unit)
                 raise
             except Exception:  # the code of somebody else: its other devices are opened
                 logger.exception("%s: a device cannot be opened", self._title)

@@ -169,9 +169,12 @@ def open_film(source: VideoSource) -> Film:
 
 
 def _decoded(path: Path) -> Raw | None:
-    # OpenCV itself opens no path with other letters than ASCII on Windows.
-    data = np.fromfile(path, np.uint8)
-    image: Any = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    try:
+        # OpenCV itself opens no path with other letters than ASCII on Windows.
+        data = np.fromfile(path, np.uint8)
+        image: Any = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    except (OSError, cv2.error):  # it may not be read, or says that it has too many pixels
+        return None
     known = image is not None and image.dtype in (np.uint8, np.uint16)
     return image if known else None
 

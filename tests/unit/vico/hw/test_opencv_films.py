@@ -1,5 +1,7 @@
 """Films, folders of images and addresses through OpenCV."""
 
+import struct
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -139,6 +141,31 @@ def test_what_is_no_film_is_named_with_the_reason(tmp_path: Path) -> None:
     ):
         with pytest.raises(NotConnectedError, match=reason):
             opened(VideoSource(str(tmp_path / name)))
+
+
+def boundless_png() -> bytes:
+    """Return a PNG whose head says that it has more pixels than OpenCV takes."""
+
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        check = struct.pack(">I", zlib.crc32(kind + body))
+        return struct.pack(">I", len(body)) + kind + body + check
+
+    head = struct.pack(">IIBBBBB", 100_000, 100_000, 8, 0, 0, 0, 0)
+    body = chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(bytes(100)))
+    return b"\x89PNG\r\n\x1a\n" + body + chunk(b"IEND", b"")
+
+
+def test_an_image_that_opencv_fails_at_is_named_at_the_beginning_and_later(tmp_path: Path) -> None:
+    (tmp_path / "b.png").write_bytes(boundless_png())
+    with pytest.raises(NotConnectedError, match=r"b\.png: it is no image"):
+        opened(VideoSource(str(tmp_path)))
+    cv2.imwrite(str(tmp_path / "a.png"), pattern(0))
+    camera = opened(VideoSource(str(tmp_path), paced=False))
+    camera.start()
+    assert camera.receive(0.0) is not None
+    with pytest.raises(DeviceError, match=r"b\.png: it cannot be decoded"):
+        camera.receive(0.0)
+    camera.close()
 
 
 def test_an_image_of_another_size_ends_the_reception(tmp_path: Path) -> None:
