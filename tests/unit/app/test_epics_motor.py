@@ -10,7 +10,7 @@ from caproto import CAStatus
 from cosmic.app.gateways import epics_channels as ca
 from cosmic.app.gateways.epics_channels import Who
 from cosmic.app.gateways.epics_motor import MotorRecord
-from cosmic.frame.errors import CosmicError, refusal
+from cosmic.frame.errors import CosmicError, MoveCancelled, refusal
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.hw.interface import Channel, PositionerKind
@@ -97,6 +97,31 @@ def test_a_refused_put_at_rest_is_shown_and_keeps_nobody_waiting() -> None:
         assert await put(record, HOLDER, 10.0)
         assert record.channels["R.RBV"].alarm.severity == ca.NO_ALARM[1]
         assert commander.looks == 1
+
+    with_record(act)
+
+
+def test_a_new_target_in_motion_raises_no_alarm_and_a_refused_one_keeps_its_own() -> None:
+    async def act(record: MotorRecord, commander: Commander) -> None:
+        first = asyncio.ensure_future(put(record, HOLDER, 50.0))
+        await asyncio.sleep(0.01)
+        replaced, commander.arrive = commander.arrive, asyncio.Event()
+        second = asyncio.ensure_future(put(record, HOLDER, -20.0))
+        await asyncio.sleep(0.01)
+        commander.refused = MoveCancelled("left.x: replaced by a newer command")
+        replaced.set()
+        assert not await first, "who put it first is told"
+        channel = record.channels["R.RBV"]
+        assert channel.alarm.severity == ca.NO_ALARM[1], "the axis moves as it shall"
+        assert values(record, "DMOV", "VAL") == [0.0, -20.0]
+        commander.refused = refusal(refuse(Reason.LIMIT, "outside its limit"))
+        going, commander.arrive = commander.arrive, asyncio.Event()
+        commander.arrive.set()
+        assert not await put(record, HOLDER, 5000.0)
+        commander.refused = None
+        going.set()
+        assert await second
+        assert (channel.alarm.status, channel.alarm.severity) == ca.ALARMS["LIMIT"]
 
     with_record(act)
 

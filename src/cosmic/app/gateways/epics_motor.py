@@ -73,6 +73,7 @@ class MotorRecord:
         self._newest = state
         self._commander = commander
         self._moves = 0
+        self._begun = 0
         self._target = state.position or 0.0
         self._in_motion = state.in_motion
         self._showing = asyncio.Lock()
@@ -243,6 +244,8 @@ class MotorRecord:
         if self._moves and not allowed:
             raise PutRefused("it moves for another client")  # who is not to notice
         self._moves += 1
+        self._begun += 1
+        number = self._begun
         try:
             self._alarm = ca.NO_ALARM
             if target is not None and isfinite(target):
@@ -250,8 +253,9 @@ class MotorRecord:
                 await self._show_target()
             await self._show_moving()
             failure = await self._failure(who, motion)
-            self._alarm = _alarm_of(failure)
-            await ca.show(self._reason, "" if failure is None else str(failure)[:499])
+            if number == self._begun:  # else a newer one has replaced it, and says how it goes
+                self._alarm = _alarm_of(failure)
+                await ca.show(self._reason, "" if failure is None else str(failure)[:499])
             # Whoever may not move has moved nothing; many of them are not to keep others waiting.
             await self.show(await self._commander.look(self._axis) if allowed else None)
             if (failure is not None or target is None) and self._moves == 1:
