@@ -136,9 +136,14 @@ def test_an_assistant_uses_the_same_commands_over_mcp(door: Door) -> None:
                 refused = said("tools/call", name=tool, arguments={wrong: value})["error"]
                 assert refused["message"].startswith(f"{wrong}: a number of seconds")
         assert said("nothing")["error"]["code"] == -32601
+        for number in ("NaN", "1e999", "[1]", "{}"):  # of what an answer cannot carry
+            message = f'{{"jsonrpc": "2.0", "method": "ping", "id": {number}}}'
+            answer = http.post("/mcp", content=message)
+            assert answer.json()["error"]["code"] == -32600, number
         notice = {"jsonrpc": "2.0", "method": "notifications/initialized"}
         assert http.post("/mcp", json=notice).status_code == 202
     assert door.home.drawers["top"].moved_um == [4.0]
+    assert not door.failures
 
 
 def test_what_moves_needs_the_right_and_goes_through_the_lease(door: Door) -> None:

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
 from typing import Any, Final
 
 from cosmic.app.gateways.catalogue import Command, commands_of
@@ -59,6 +59,8 @@ class McpTools:
     async def answer(self, message: Mapping[str, Any], uses: McpUses) -> dict[str, Any] | None:
         """Return the answer to a message; None to one that wants none."""
         number, method = message.get("id"), message.get("method")
+        if not (number is None or isinstance(number, str | int) or _is_finite(number)):
+            return _error(None, _BAD_REQUEST, "an id is a text or a number")
         if message.get("jsonrpc") != "2.0" or not isinstance(method, str):
             return _error(number, _BAD_REQUEST, "no message of JSON-RPC 2.0")
         if number is None:
@@ -110,6 +112,10 @@ class McpTools:
         except CosmicError as exc:
             return _result(number, _failed(exc))
         return _result(number, _said(json.dumps(to_json(result)), failed=False))
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, float) and isfinite(value)
 
 
 def _seconds(given: Mapping[str, Any], name: str, default_s: float, *, least_s: float) -> float:
