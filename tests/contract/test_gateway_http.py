@@ -420,6 +420,22 @@ def test_what_makes_no_sense_is_refused_and_nobody_else_notices(door: Door) -> N
     assert not door.failures
 
 
+@pytest.mark.parametrize(
+    "said",
+    [b"now!", b"[]", b'{"reason": 5}', b'{"why": "x", "#": "1"}', b"x" * (BODY_LIMIT_BYTES + 1)],
+    ids=["no JSON", "a list", "another name", "odd names", "too long"],
+)
+def test_a_stop_is_carried_out_whatever_it_is_said_with(door: Door, said: bytes) -> None:
+    with door.client("view") as http:
+        assert http.post("/api/cabinet/stop", content=said).is_success
+        assert http.post("/api/cabinet/stop?wait=soon").is_success
+        call = {"name": "cabinet_stop", "arguments": [5]}
+        message = {"jsonrpc": "2.0", "id": 1, "method": "tools/call", "params": call}
+        assert http.post("/mcp", json=message).json()["result"]["isError"] is False
+    assert door.home.stops == 3
+    assert not door.failures
+
+
 def test_a_flood_of_one_client_is_held_back_and_a_stop_still_passes(
     door: Door, monkeypatch: pytest.MonkeyPatch
 ) -> None:

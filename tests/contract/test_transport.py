@@ -159,6 +159,12 @@ def test_a_stop_waits_for_nobody_and_needs_no_lease(rig: StationRig) -> None:
         call.result(5.0)
 
 
+def test_a_stop_is_carried_out_whatever_it_is_given(rig: StationRig) -> None:
+    for given in ({"reason": 5}, {"": None}):
+        rig.client.call("stage", "stop", given)
+    assert rig.application.stops == 2
+
+
 def test_what_waited_too_long_is_not_carried_out(rig: StationRig) -> None:
     rig.client.take_lease()
     with ThreadPoolExecutor(2) as pool:

@@ -543,7 +543,7 @@ def test_a_camera_in_a_scan_keeps_a_fresh_image_of_every_place(
     assert status.exception(5.0) is None or isinstance(status.exception(), cosmic.CosmicError)
 
 
-def test_a_plan_paused_between_trigger_and_reading_tells_of_one_image_a_point(
+def test_a_plan_paused_between_trigger_and_reading_has_one_image_a_point(
     engine: RunEngine, documents: Documents, tmp_path: Path
 ) -> None:
     with cosmic.connect(applications=("vico",), rate=4.0) as rig:

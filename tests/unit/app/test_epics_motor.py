@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from typing import Any
 
-from caproto import CAStatus
+from caproto import CAStatus, ChannelType
 
 from cosmic.app.gateways import epics_channels as ca
 from cosmic.app.gateways.epics_channels import Who
@@ -162,6 +162,20 @@ def test_an_older_state_that_is_slow_to_write_takes_no_newer_alarm_away() -> Non
 
 def values(record: MotorRecord, *names: str) -> list[float]:
     return [float(record.channels[f"R.{name}"].value) for name in names]
+
+
+def test_a_stop_is_carried_out_whatever_is_put() -> None:
+    async def act(record: MotorRecord, commander: Commander) -> None:
+        commander.arrive.set()
+        for number, value in enumerate(([1], [7.5], [1, 2], [b"halt!"]), 1):
+            kind = ChannelType.STRING if isinstance(value[0], bytes) else ChannelType.DOUBLE
+            status = await record.channels["R.STOP"].auth_write(
+                HOLDER.host, HOLDER.user, value, kind, None, user_address=HOLDER.address
+            )
+            assert status == DONE
+            assert commander.runs == number
+
+    with_record(act)
 
 
 def test_a_setpoint_follows_an_axis_that_others_moved() -> None:

@@ -95,7 +95,7 @@ class MotorRecord:
             "TWV": axis_number(1.0, self._set_step),
             "TWF": ca.whole(put=self._tweak(1.0)),
             "TWR": ca.whole(put=self._tweak(-1.0)),
-            "STOP": ca.whole(put=self._halt),
+            "STOP": ca.whole(put=self._halt, otherwise=1),
             "DMOV": ca.whole(1),
             "MOVN": ca.whole(0),
             "HLM": axis_number(limits[1]),

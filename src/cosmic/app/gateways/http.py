@@ -383,8 +383,14 @@ class HttpGateway:
     async def _command(self, request: Request, user: _User) -> Response:
         application = request.path_params["application"]
         function, keys = self._address(application, request.path_params["path"])
-        seconds_of(request, "wait", 0.0, LONGEST_WAIT_S)  # refused before anything is carried out
-        arguments = await body_of(request)
+        try:
+            # Refused before anything is carried out; but a stop is, whatever it is said with.
+            seconds_of(request, "wait", 0.0, LONGEST_WAIT_S)
+            arguments = await body_of(request)
+        except HttpError:
+            if not self._is_stop(request):
+                raise
+            arguments = {}
         order = user.session.order(application, function, arguments, keys)
         queue = "stops" if order.found.mark.at_once else application
         result = await self._carried_out(request, user, order, queue)

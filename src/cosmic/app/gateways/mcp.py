@@ -68,20 +68,28 @@ class McpTools:
         parameters = message.get("params", {})
         if not isinstance(parameters, dict):
             return _error(number, _BAD_PARAMS, "params are an object")
+        return await self._answered(number, method, parameters, uses)
+
+    async def _answered(
+        self, number: object, method: str, parameters: Mapping[str, Any], uses: McpUses
+    ) -> dict[str, Any]:
         if method == "initialize":
             return _result(number, _WELCOME)
         if method == "ping":
             return _result(number, {})
         if method == "tools/list":
             return _result(number, {"tools": self._tools})
-        if method == "tools/call":
-            name, given = str(parameters.get("name", "")), parameters.get("arguments", {})
-            if not isinstance(given, dict):
+        if method != "tools/call":
+            return _error(number, _NO_METHOD, f"there is no method {method[:40]!r}")
+        name, given = str(parameters.get("name", "")), parameters.get("arguments", {})
+        if not isinstance(given, dict):
+            found = self._commands.get(name)
+            if found is None or not found.declared.need.at_once:
                 return _error(number, _BAD_PARAMS, "arguments are an object")
-            if name in _FIXED:
-                return await self._done(number, name, given, uses)
-            return await self._called(number, name, given, uses.call)
-        return _error(number, _NO_METHOD, f"there is no method {method[:40]!r}")
+            given = {}  # a stop is carried out whatever it is said with
+        if name in _FIXED:
+            return await self._done(number, name, given, uses)
+        return await self._called(number, name, given, uses.call)
 
     async def _done(
         self, number: object, name: str, given: Mapping[str, Any], uses: McpUses
