@@ -224,6 +224,23 @@ def test_the_local_operator_takes_over_and_what_moved_has_to_stop(rig: StationRi
     assert dead_man.expired, "a new lease revives no old motion"
 
 
+def test_what_fails_to_be_cancelled_leaves_nothing_else_moving(rig: StationRig) -> None:
+    def fail() -> None:
+        raise DeviceError("the line to the stage is cut")
+
+    other = rig.another("other")
+    for end in (rig.station.lease.take_over, other.close):
+        rig.station.lease.offer()
+        other.take_lease()
+        rig.application.tasks.clear()
+        for _ in range(3):
+            other.call("stage", "travel")
+        first, *rest = rig.application.tasks
+        first.on_cancel(fail)
+        end()
+        assert wait_until(lambda: all(each.done for each in rest), 5.0)  # noqa: B023
+
+
 def test_closing_gives_the_lease_back_and_stops_what_moves(rig: StationRig) -> None:
     other = rig.another("other")
     other.take_lease()
