@@ -17,6 +17,8 @@ SETTLED_S: Final = 0.03
 """Between `DMOV` and the end of a put."""
 FRESH_S: Final = 2.0
 """So long a value is one of now though no sample follows."""
+LONGEST_WAVE: Final = 20_000
+"""So many samples a record has; where the simulation is fast, more come at once."""
 SMALLEST_STEP: Final = 0.001
 """What `MRES` and the deadband say, in units of the axis."""
 
@@ -302,7 +304,7 @@ class ValueRecord:
 
     def __init__(self, name: str, unit: str) -> None:
         self._value = ca.number(units=unit)
-        self._wave = ca.wave(20_000, unit)
+        self._wave = ca.wave(LONGEST_WAVE, unit)
         self._unit = ca.line(unit)
         self._ends = {"HIHI": ca.number(nan), "LOLO": ca.number(nan)}
         self._alarms = {"STAT": ca.whole(), "SEVR": ca.whole()}
@@ -336,7 +338,7 @@ class ValueRecord:
             await ca.show(self._ends[field], each)
         await self._show_alarm(alarm)
         await ca.show(self._value, value, alarm, units=unit, **bounds)
-        await ca.show(self._wave, samples, alarm)
+        await ca.show(self._wave, samples[-LONGEST_WAVE:], alarm)
         await ca.show(self._unit, unit[:39])
 
     async def look(self, now_s: float) -> None:
