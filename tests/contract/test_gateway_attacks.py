@@ -130,6 +130,43 @@ def test_a_line_that_is_cut_while_requests_crowd_ends_what_moves(
         assert wait_until(lambda: dead_man.expired, 0.7), "before silence alone would end it"
 
 
+def test_who_guesses_tokens_waits_whatever_address_it_claims_and_by_whatever_door(
+    door: http.Door, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosmic.app.gateways.http.SLOWED_AFTER", 5)
+    for number in range(6):
+        claimed = {"Authorization": "Bearer x", "X-Forwarded-For": f"10.0.0.{number}"}
+        begun_s = time.perf_counter()
+        assert httpx.get(door.address + "/api/station", headers=claimed).status_code == 401
+    assert time.perf_counter() - begun_s > 0.9
+    with connect(door.address.replace("http", "ws") + "/api/events", proxy=None) as line:
+        begun_s = time.perf_counter()
+        line.send('{"token": "x"}')
+        with pytest.raises(ConnectionClosed):
+            line.recv(5.0)
+        assert time.perf_counter() - begun_s > 0.9
+    with door.client() as client:
+        begun_s = time.perf_counter()
+        assert client.get("/api/station").is_success
+        assert time.perf_counter() - begun_s < 0.9
+
+
+def test_a_line_through_a_proxy_stays_open_and_counts(
+    door: http.Door, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosmic.app.gateways.http_lines.STRANGER_S", 0.5)
+    monkeypatch.setattr("cosmic.app.gateways.http_lines.MOST_LINES", 1)
+    where, claimed = door.address.replace("http", "ws") + "/api/events", "10.1.2.3"
+    with connect(where, proxy=None, additional_headers={"X-Forwarded-For": claimed}) as line:
+        line.send(json.dumps({"token": http.TOKENS["view"], "follow": ["cabinet/state"]}))
+        until_s = time.perf_counter() + 1.5
+        while time.perf_counter() < until_s:
+            line.recv(5.0)
+        with door.client("view") as one_more:
+            answer = one_more.get("/api/station", headers={"X-Forwarded-For": claimed})
+            assert answer.status_code == 429
+
+
 FILES = (
     *("..%2f..%2f..%2fetc%2fpasswd", "../../../etc/passwd", "%2e%2e/%2e%2e/etc/passwd"),
     *("/etc/passwd", "%00", "..%5c..%5cwindows", "..", ".", "a" * 3000),

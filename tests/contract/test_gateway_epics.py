@@ -262,6 +262,13 @@ def test_what_keeps_a_motion_alive_does_not_end_it() -> None:
         assert wait_until(lambda: door.home.tasks[0].done)
 
 
+@pytest.mark.parametrize("said", ["1", 1, 2.5, "now!", '{"why": 1}', ""])
+def test_a_stop_is_carried_out_whatever_is_put(said: object) -> None:
+    with opened() as door, used(door) as client:
+        assert client.put("T:cabinet:stop", said)
+        assert door.home.stops == 1
+
+
 def test_a_gateway_that_only_shows_still_lets_everybody_stop() -> None:
     with opened(write=False) as door, used(door) as client:
         assert not client.put("T:control", 1)

@@ -136,9 +136,14 @@ def test_an_assistant_uses_the_same_commands_over_mcp(door: Door) -> None:
                 refused = said("tools/call", name=tool, arguments={wrong: value})["error"]
                 assert refused["message"].startswith(f"{wrong}: a number of seconds")
         assert said("nothing")["error"]["code"] == -32601
+        for number in ("NaN", "1e999", "[1]", "{}"):  # of what an answer cannot carry
+            message = f'{{"jsonrpc": "2.0", "method": "ping", "id": {number}}}'
+            answer = http.post("/mcp", content=message)
+            assert answer.json()["error"]["code"] == -32600, number
         notice = {"jsonrpc": "2.0", "method": "notifications/initialized"}
         assert http.post("/mcp", json=notice).status_code == 202
     assert door.home.drawers["top"].moved_um == [4.0]
+    assert not door.failures
 
 
 def test_what_moves_needs_the_right_and_goes_through_the_lease(door: Door) -> None:
@@ -412,6 +417,22 @@ def test_what_makes_no_sense_is_refused_and_nobody_else_notices(door: Door) -> N
             assert answer.json()["error"]["text"]
         assert http.get("/api/cabinet/state/drawers/top/position_um").json() == 0.0
     assert door.home.drawers["top"].moved_um == []
+    assert not door.failures
+
+
+@pytest.mark.parametrize(
+    "said",
+    [b"now!", b"[]", b'{"reason": 5}', b'{"why": "x", "#": "1"}', b"x" * (BODY_LIMIT_BYTES + 1)],
+    ids=["no JSON", "a list", "another name", "odd names", "too long"],
+)
+def test_a_stop_is_carried_out_whatever_it_is_said_with(door: Door, said: bytes) -> None:
+    with door.client("view") as http:
+        assert http.post("/api/cabinet/stop", content=said).is_success
+        assert http.post("/api/cabinet/stop?wait=soon").is_success
+        call = {"name": "cabinet_stop", "arguments": [5]}
+        message = {"jsonrpc": "2.0", "id": 1, "method": "tools/call", "params": call}
+        assert http.post("/mcp", json=message).json()["result"]["isError"] is False
+    assert door.home.stops == 3
     assert not door.failures
 
 

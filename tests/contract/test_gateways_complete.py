@@ -92,13 +92,20 @@ def test_every_command_answers_over_http_mcp_and_epics_and_at_the_station() -> N
     host.close()
     assert offered >= {each.replace(".*", "").removeprefix("cabinet.") for each in wanted}
     wrong = {"no such argument": 1}
+    stop = "cabinet.stop"  # is carried out whatever it is given, and answers so
+    wanted.remove(stop)
     with http.opened(WithBell) as door, door.client() as client:
         client.post("/api/control")
         said = {"jsonrpc": "2.0", "id": 1, "method": "tools/list"}
         listed = client.post("/mcp", json=said).json()["result"]["tools"]
-        assert {each.replace(".*", "").replace(".", "_") for each in wanted} <= {
+        assert {each.replace(".*", "").replace(".", "_") for each in {stop, *wanted}} <= {
             each["name"] for each in listed
         }
+        assert client.post("/api/cabinet/stop", json=wrong).json() == {"result": None}
+        said = {"jsonrpc": "2.0", "id": 1, "method": "tools/call"}
+        call = {"params": {"name": "cabinet_stop", "arguments": wrong}}
+        assert not client.post("/mcp", json=said | call).json()["result"]["isError"]
+        assert door.home.stops == 2
         for each in wanted:
             path = "/api/" + each.replace("*", "top").replace(".", "/")
             answer = client.post(path, json=wrong)
@@ -111,6 +118,8 @@ def test_every_command_answers_over_http_mcp_and_epics_and_at_the_station() -> N
             assert "takes" in call.json()["error"]["message"], each
     with epics.opened(WithBell) as there, epics.used(there) as line:
         assert line.put("T:control", 1)
+        assert line.put("T:cabinet:stop", '{"no such argument": 1}')
+        assert there.home.stops == 1
         for each in wanted - {"cabinet.spare.shine"}:  # there is no spare lamp now
             record = "T:" + each.replace("*", "top").replace(".", ":")
             assert not line.put(record, '{"no such argument": 1}'), record

@@ -856,5 +856,7 @@ def test_a_station_that_is_away_leaves_axes_absent_and_moves_refused(hosted: Hos
             with pytest.raises(StationAway):
                 mico.stop("x")
             assert mico.check({"left.x": 10.0}).reason is Reason.NO_ANSWER
+            with pytest.raises(NotAvailable, match="closed"):
+                mico.clearance()
         finally:
             application.shut_down()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from contract.mico_rig import hosted_mico, remote_mico, wait_for
+from cosmic.frame.errors import MoveCancelled, StoppedError
 from cosmic.frame.network.errors import StationTimeout
 from cosmic.mico.api.mico import Mico
 from system.odd_arguments import LEFT_OUT, calls_of, complaint, tried
@@ -46,6 +47,37 @@ def mico() -> Iterator[Mico]:
     with hosted_mico(rate=50.0) as hosted, remote_mico(hosted, "in-process") as (made, _, _):
         wait_for(lambda: has_answered(made))
         yield made
+
+
+class MuteError(Exception):
+    def __str__(self) -> str:
+        raise ValueError("no text")
+
+
+REASONS = [
+    None,
+    5,
+    ValueError("too much force"),
+    MuteError(),
+    b"x",
+    np.ones(2),
+    "x" * 100_000,
+    "\ud800",
+]
+
+
+@pytest.mark.parametrize("reason", REASONS, ids=lambda reason: type(reason).__name__)
+def test_a_stop_is_carried_out_whatever_reason_it_is_given(mico: Mico, reason: Any) -> None:
+    axis = mico["left.x"]
+    axis.set_closed_loop_frequency(50)
+    move = axis.move_to(2000.0, wait=False)
+    axis.halt(reason)
+    assert isinstance(move.exception(5.0), MoveCancelled)
+    move = axis.move_to(-2000.0, wait=False)
+    mico.stop(reason)
+    assert isinstance(move.exception(5.0), StoppedError)
+    wait_for(lambda: mico.stop_state.reason)
+    mico.reset_stop()
 
 
 @pytest.mark.parametrize("name", THINGS)

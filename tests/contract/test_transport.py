@@ -159,6 +159,12 @@ def test_a_stop_waits_for_nobody_and_needs_no_lease(rig: StationRig) -> None:
         call.result(5.0)
 
 
+def test_a_stop_is_carried_out_whatever_it_is_given(rig: StationRig) -> None:
+    for given in ({"reason": 5}, {"": None}):
+        rig.client.call("stage", "stop", given)
+    assert rig.application.stops == 2
+
+
 def test_what_waited_too_long_is_not_carried_out(rig: StationRig) -> None:
     rig.client.take_lease()
     with ThreadPoolExecutor(2) as pool:
@@ -216,6 +222,23 @@ def test_the_local_operator_takes_over_and_what_moved_has_to_stop(rig: StationRi
     rig.station.lease.offer()
     rig.client.take_lease()
     assert dead_man.expired, "a new lease revives no old motion"
+
+
+def test_what_fails_to_be_cancelled_leaves_nothing_else_moving(rig: StationRig) -> None:
+    def fail() -> None:
+        raise DeviceError("the line to the stage is cut")
+
+    other = rig.another("other")
+    for end in (rig.station.lease.take_over, other.close):
+        rig.station.lease.offer()
+        other.take_lease()
+        rig.application.tasks.clear()
+        for _ in range(3):
+            other.call("stage", "travel")
+        first, *rest = rig.application.tasks
+        first.on_cancel(fail)
+        end()
+        assert wait_until(lambda: all(each.done for each in rest), 5.0)  # noqa: B023
 
 
 def test_closing_gives_the_lease_back_and_stops_what_moves(rig: StationRig) -> None:

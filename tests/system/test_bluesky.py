@@ -543,6 +543,40 @@ def test_a_camera_in_a_scan_keeps_a_fresh_image_of_every_place(
     assert status.exception(5.0) is None or isinstance(status.exception(), cosmic.CosmicError)
 
 
+def test_a_plan_paused_between_trigger_and_reading_has_one_image_a_point(
+    engine: RunEngine, documents: Documents, tmp_path: Path
+) -> None:
+    with cosmic.connect(applications=("vico",), rate=4.0) as rig:
+        camera = rig.vico.camera()
+        camera.plan_images(tmp_path)
+
+        def plan() -> Iterator[Any]:
+            yield from bps.stage(camera)
+            yield from bps.open_run()
+            for point in range(3):
+                yield from bps.checkpoint()
+                yield from bps.create()
+                yield from bps.trigger(camera, wait=True)
+                if point < 2 and len(list(tmp_path.glob("*.tif"))) == 2 * point + 1:
+                    yield from bps.pause()
+                yield from bps.read(camera)
+                yield from bps.save()
+            yield from bps.close_run()
+
+        with pytest.raises(RunEngineInterrupted):
+            engine(plan())
+        with pytest.raises(RunEngineInterrupted):
+            engine.resume()
+        engine.resume()
+        kept = [Path(each[f"{camera.name}_file"]) for each in events(documents)]
+        assert [each.name[-9:] for each in kept] == ["00002.tif", "00004.tif", "00005.tif"]
+        told = [document for name, document in documents if name.startswith("stream_")]
+        (folder, *images) = told
+        names = [folder["parameters"]["template"].format(n["indices"]["start"]) for n in images]
+        assert names == [each.name for each in kept]
+        assert [each["seq_nums"]["start"] for each in images] == [1, 2, 3]
+
+
 def test_images_kept_as_png_are_named_by_their_paths_alone(
     engine: RunEngine, documents: Documents, tmp_path: Path
 ) -> None:

@@ -243,6 +243,22 @@ def test_what_breaks_the_rules_is_refused_and_logged_and_nobody_else_notices(
     assert "refused rude" in caplog.text
 
 
+@pytest.mark.parametrize("client", ["*/*", "honest/*", "**", "a b/1", "a\nb/1", "\u00e9/1"])
+def test_a_name_that_could_stand_for_others_is_let_in_nowhere(served: Served, client: str) -> None:
+    with ExitStack() as stack:
+        honest = stack.enter_context(connected(served.endpoint, "honest"))
+        wire = ZenohWire(Line(served.endpoint, False, "fibres"))
+        stack.callback(wire.close)
+        door = greetings("fibres", client)
+        assert wait_until(lambda: _answers(wire, door, b"hm"))
+        said = wire.ask(door, request("", "", "", {}, order="hello"), timeout_s=2.0)
+        for _ in range(50):
+            assert honest.call("stage", "echo", {"value": 1.0}) == 1.0
+            honest.take_lease()
+            honest.release_lease()
+        assert isinstance(read_answer(said)[2], CosmicError)
+
+
 def _answers(wire: ZenohWire, key: str, message: bytes) -> bool:
     try:
         wire.ask(key, message, timeout_s=2.0)

@@ -42,8 +42,8 @@ def connect(
         How many times faster than the wall the simulated platform runs at most.
     stations : mapping of str to str, or sequence of str
         Other stations by name, with where they listen, such as
-        ``{"fibervision": "tcp/127.0.0.1:7448"}``; names alone of stations used before. What they
-        host is used there and not hosted here.
+        ``{"fibervision": "tcp/127.0.0.1:7448"}`` or ``"fibervision=tcp/127.0.0.1:7448"``; names
+        alone of stations used before. What they host is used there and not hosted here.
     cold : bool
         Start the simulated platform at power-up, with no position known.
     seed : int
@@ -107,7 +107,7 @@ def connect(
 def _addresses(stations: Mapping[str, str] | Sequence[str]) -> tuple[StationAddress, ...]:
     if not isinstance(stations, Mapping):
         names = (stations,) if isinstance(stations, str) else stations
-        return tuple(StationAddress.known(each) for each in names)
+        return tuple(StationAddress.read(each) for each in names)
     for station, endpoint in stations.items():
         if not (isinstance(station, str) and isinstance(endpoint, str)):
             raise TypeError(f"connect: stations must map names to endpoints, not {endpoint!r}")

@@ -34,8 +34,9 @@ _TIMES: Final = ("timeout_s", "budget_s", "since_s", "start_s", "end_s", "interv
 """What is waited for, or looked up: the system takes no others."""
 _CHECKED_FURTHER_IN: Final = ("position", "distance", "value")
 """Targets: the gate refuses what is none, with its reason."""
-_NEVER_REFUSED: Final = ("stop", "abort", "cancel")
-"""What ends a movement does so whatever reason it is given."""
+_NEVER_REFUSED: Final = ("stop", "abort", "cancel", "halt", "stop_outputs")
+"""What ends a movement does so whatever reason it is given; see `reason_of`."""
+_LONGEST_REASON: Final = 500
 
 
 class _WrongKindError(Exception):
@@ -95,6 +96,18 @@ def checked_class(kind: C) -> C:
         elif isinstance(member, property) and member.fset is not None:
             setattr(kind, name, member.setter(checked(member.fset)))
     return kind
+
+
+def reason_of(given: object) -> str:
+    """Return what a stop was given as its reason as a short text; empty for nothing.
+
+    Whatever it is, it keeps no stop from being carried out, here or at a station.
+    """
+    try:
+        text = "" if given is None else str(given)
+    except Exception:  # noqa: BLE001 - foreign code
+        text = type(given).__name__
+    return "".join(each if each.isprintable() else " " for each in text[:_LONGEST_REASON])
 
 
 def check_path(name: str, path: str | Path) -> None:

@@ -5,12 +5,12 @@ from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from typing import Any
 
-from caproto import CAStatus
+from caproto import CAStatus, ChannelType
 
 from cosmic.app.gateways import epics_channels as ca
 from cosmic.app.gateways.epics_channels import Who
 from cosmic.app.gateways.epics_motor import MotorRecord
-from cosmic.frame.errors import CosmicError, refusal
+from cosmic.frame.errors import CosmicError, MoveCancelled, refusal
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.hw.interface import Channel, PositionerKind
@@ -101,6 +101,31 @@ def test_a_refused_put_at_rest_is_shown_and_keeps_nobody_waiting() -> None:
     with_record(act)
 
 
+def test_a_new_target_in_motion_raises_no_alarm_and_a_refused_one_keeps_its_own() -> None:
+    async def act(record: MotorRecord, commander: Commander) -> None:
+        first = asyncio.ensure_future(put(record, HOLDER, 50.0))
+        await asyncio.sleep(0.01)
+        replaced, commander.arrive = commander.arrive, asyncio.Event()
+        second = asyncio.ensure_future(put(record, HOLDER, -20.0))
+        await asyncio.sleep(0.01)
+        commander.refused = MoveCancelled("left.x: replaced by a newer command")
+        replaced.set()
+        assert not await first, "who put it first is told"
+        channel = record.channels["R.RBV"]
+        assert channel.alarm.severity == ca.NO_ALARM[1], "the axis moves as it shall"
+        assert values(record, "DMOV", "VAL") == [0.0, -20.0]
+        commander.refused = refusal(refuse(Reason.LIMIT, "outside its limit"))
+        going, commander.arrive = commander.arrive, asyncio.Event()
+        commander.arrive.set()
+        assert not await put(record, HOLDER, 5000.0)
+        commander.refused = None
+        going.set()
+        assert await second
+        assert (channel.alarm.status, channel.alarm.severity) == ca.ALARMS["LIMIT"]
+
+    with_record(act)
+
+
 def test_an_alarm_after_another_one_is_an_alarm() -> None:
     channel = ca.number(units="um")
 
@@ -137,6 +162,20 @@ def test_an_older_state_that_is_slow_to_write_takes_no_newer_alarm_away() -> Non
 
 def values(record: MotorRecord, *names: str) -> list[float]:
     return [float(record.channels[f"R.{name}"].value) for name in names]
+
+
+def test_a_stop_is_carried_out_whatever_is_put() -> None:
+    async def act(record: MotorRecord, commander: Commander) -> None:
+        commander.arrive.set()
+        for number, value in enumerate(([1], [7.5], [1, 2], [b"halt!"]), 1):
+            kind = ChannelType.STRING if isinstance(value[0], bytes) else ChannelType.DOUBLE
+            status = await record.channels["R.STOP"].auth_write(
+                HOLDER.host, HOLDER.user, value, kind, None, user_address=HOLDER.address
+            )
+            assert status == DONE
+            assert commander.runs == number
+
+    with_record(act)
 
 
 def test_a_setpoint_follows_an_axis_that_others_moved() -> None:

@@ -81,3 +81,13 @@ def test_a_value_that_no_sample_follows_is_not_that_of_now() -> None:
         assert alarm(record) == ca.NO_ALARM
 
     with_record(act)
+
+
+def test_the_newest_samples_are_shown_however_many_come_at_once() -> None:
+    async def act(record: ValueRecord) -> None:
+        await record.show(np.arange(24_000.0), "uN", None, 0.0)
+        wave = record.channels["F:wave"].value
+        assert (len(wave), wave[-1]) == (20_000, 23_999.0)
+        assert record.channels["F"].value == pytest.approx(11_999.5)
+
+    with_record(act)

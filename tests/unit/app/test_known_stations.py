@@ -13,6 +13,7 @@ from cosmic.app.stations.address import (
     stations_file,
 )
 from cosmic.frame.errors import ConfigError
+from cosmic.frame.network.errors import StationAway
 
 VISION = StationAddress("fibervision", "tcp/127.0.0.1:7448")
 STATION = StationAddress("fiberstation", "tls/192.168.1.5:7447")
@@ -51,6 +52,13 @@ def test_an_unknown_name_is_refused_with_those_that_are_known() -> None:
     remember_stations([VISION])
     with pytest.raises(ConfigError, match=r"no station 'fiber' was used before.*fibervision"):
         cosmic.connect(stations=["fiber"])
+
+
+def test_a_script_names_a_station_as_the_refusal_of_its_name_says() -> None:
+    with pytest.raises(ConfigError, match=r"no station 'fiber'.*fiber=tcp/127.0.0.1:PORT"):
+        cosmic.connect(stations="fiber")
+    with pytest.raises(StationAway, match=r"fiber at tcp/127.0.0.1:9 does not answer"):
+        cosmic.connect(stations="fiber=tcp/127.0.0.1:9")
 
 
 def test_a_damaged_file_is_named_and_left_as_it_is(caplog: pytest.LogCaptureFixture) -> None:

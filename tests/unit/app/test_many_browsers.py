@@ -1,11 +1,14 @@
 """What is told to many browsers: less often the more there are, and in one go."""
 
 import asyncio
+import gc
 
 import pytest
 
+from cosmic.app.gateways.http_answers import ended
 from cosmic.app.gateways.hub import LONGEST_S, SHORTEST_S, published_every_s
 from cosmic.app.gateways.websocket_line import Handover
+from cosmic.frame.operation import Operation
 
 
 @pytest.mark.parametrize(
@@ -33,3 +36,21 @@ def test_a_loop_is_woken_once_for_all_that_is_handed_over_from_a_thread() -> Non
     came, woken = asyncio.run(run())
     assert came == list(range(21))
     assert woken == 1
+
+
+def test_who_waits_for_hours_costs_no_memory() -> None:
+    def looks() -> int:
+        gc.collect()
+        return sum(isinstance(each, asyncio.Event) for each in gc.get_objects())
+
+    async def run() -> int:
+        campaign: Operation[None] = Operation("a campaign of a day")
+        before = looks()
+        for _ in range(100):
+            await ended(campaign, 0.0)
+        kept = looks() - before
+        campaign.finish(None)
+        await asyncio.wait_for(ended(campaign, 60.0), 5.0)
+        return kept
+
+    assert asyncio.run(run()) == 0

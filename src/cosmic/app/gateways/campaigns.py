@@ -10,6 +10,7 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Final
 
+from cosmic.frame.arguments import reason_of
 from cosmic.frame.clock import WALL
 from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.declaration import Declared, command, state
@@ -232,7 +233,7 @@ class Campaigns(Declared):
         """End it now: what moves is cancelled, then it is made safe."""
         campaign = self._campaign
         if campaign is not None:
-            campaign.abort(reason[:200])
+            campaign.abort(reason_of(reason)[:200])
 
     @command(reads=True)
     def results(self, first: int = 0) -> tuple[CampaignFibre, ...]:

@@ -212,11 +212,11 @@ class EpicsGateway:
         async def put(who: Who, said: str) -> None:
             channel = made
             try:
-                arguments = json.loads(said or "{}")
-            except (ValueError, RecursionError) as exc:
-                raise CallRefused(f"arguments are JSON: {str(exc)[:100]}") from exc
-            if not isinstance(arguments, dict):
-                raise CallRefused("arguments are a JSON object, by their names")
+                arguments = _arguments(said)
+            except CallRefused:
+                if not command.declared.need.at_once:
+                    raise
+                arguments = {}  # a stop is carried out whatever is put
             try:
                 result = await self._carried_out(who, command, arguments, keys)
             except CosmicError as exc:
@@ -224,7 +224,7 @@ class EpicsGateway:
                 raise
             await _answer(channel, {"result": to_json(result)})
 
-        made = ca.text("{}", put=put)
+        made = ca.text("{}", put=put, otherwise="" if command.declared.need.at_once else None)
         return made
 
     # Commands
@@ -436,6 +436,17 @@ async def _ended(operation: Operation[Any]) -> None:
 
     operation.add_callback(wake)
     await ended.wait()
+
+
+def _arguments(said: str) -> dict[str, Any]:
+    """Return what was put to a command, by name; raises `CallRefused`."""
+    try:
+        found = json.loads(said or "{}")
+    except (ValueError, RecursionError) as exc:
+        raise CallRefused(f"arguments are JSON: {str(exc)[:100]}") from exc
+    if not isinstance(found, dict):
+        raise CallRefused("arguments are a JSON object, by their names")
+    return found
 
 
 async def _answer(channel: Channel, said: dict[str, Any]) -> None:

@@ -100,9 +100,9 @@ def number(
     return _guarded(made, put)
 
 
-def whole(value: int = 0, *, put: Put | None = None) -> Channel:
-    """Return a channel with a whole number."""
-    return _guarded(caproto.ChannelInteger(value=value), put)
+def whole(value: int = 0, *, put: Put | None = None, otherwise: int | None = None) -> Channel:
+    """Return a channel with a whole number; `otherwise` stands for what is written and is none."""
+    return _guarded(caproto.ChannelInteger(value=value), put, otherwise)
 
 
 def choice(words: Sequence[str], value: int = 0, *, put: Put | None = None) -> Channel:
@@ -115,15 +115,21 @@ def line(value: str = "", *, put: Put | None = None) -> Channel:
     return _guarded(caproto.ChannelString(value=value[:39], string_encoding="utf-8"), put)
 
 
-def text(value: str = "", *, put: Put | None = None, length: int = JSON_LENGTH) -> Channel:
-    """Return a channel with a long text, as an array of characters."""
+def text(
+    value: str = "",
+    *,
+    put: Put | None = None,
+    length: int = JSON_LENGTH,
+    otherwise: str | None = None,
+) -> Channel:
+    """Return a channel with a long text, as an array of characters; see `whole`."""
     made = caproto.ChannelChar(
         value=value,
         max_length=length,
         string_encoding="utf-8",
         max_subscription_backlog=_ARRAYS_WAITING,
     )
-    return _guarded(made, put)
+    return _guarded(made, put, otherwise)
 
 
 def wave(length: int, units: str = "") -> Channel:
@@ -164,8 +170,11 @@ async def show(channel: Channel, value: object, alarm: Alarm = NO_ALARM, **more:
     await channel.write(value, verify_value=False, status=status, severity=severity, **more)
 
 
-def _guarded(channel: Channel, put: Put | None) -> Channel:
-    """Have clients write through `put`; without it they may only read."""
+def _guarded(channel: Channel, put: Put | None, otherwise: object = None) -> Channel:
+    """Have clients write through `put`; without it they may only read.
+
+    What is of a wrong kind is refused, unless `otherwise` stands for it.
+    """
     rights = caproto.AccessRights.READ
     if put is not None:
         rights |= caproto.AccessRights.WRITE
@@ -186,7 +195,13 @@ def _guarded(channel: Channel, put: Put | None) -> Channel:
             return _REFUSED
         who = Who((user_address[0], user_address[1]), str(host), str(user))
         try:
-            await put(who, _value(channel, data, data_type))
+            try:
+                value = _value(channel, data, data_type)
+            except CallRefused:
+                if otherwise is None:
+                    raise
+                value = otherwise
+            await put(who, value)
         except (CosmicError, PutRefused) as exc:
             logger.info("EPICS: %s of %s: a write was refused: %s", who.user, who.host, exc)
             return _REFUSED

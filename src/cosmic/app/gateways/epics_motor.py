@@ -17,6 +17,8 @@ SETTLED_S: Final = 0.03
 """Between `DMOV` and the end of a put."""
 FRESH_S: Final = 2.0
 """So long a value is one of now though no sample follows."""
+LONGEST_WAVE: Final = 20_000
+"""So many samples a record has; where the simulation is fast, more come at once."""
 SMALLEST_STEP: Final = 0.001
 """What `MRES` and the deadband say, in units of the axis."""
 
@@ -73,6 +75,7 @@ class MotorRecord:
         self._newest = state
         self._commander = commander
         self._moves = 0
+        self._begun = 0
         self._target = state.position or 0.0
         self._in_motion = state.in_motion
         self._showing = asyncio.Lock()
@@ -94,7 +97,7 @@ class MotorRecord:
             "TWV": axis_number(1.0, self._set_step),
             "TWF": ca.whole(put=self._tweak(1.0)),
             "TWR": ca.whole(put=self._tweak(-1.0)),
-            "STOP": ca.whole(put=self._halt),
+            "STOP": ca.whole(put=self._halt, otherwise=1),
             "DMOV": ca.whole(1),
             "MOVN": ca.whole(0),
             "HLM": axis_number(limits[1]),
@@ -243,6 +246,8 @@ class MotorRecord:
         if self._moves and not allowed:
             raise PutRefused("it moves for another client")  # who is not to notice
         self._moves += 1
+        self._begun += 1
+        number = self._begun
         try:
             self._alarm = ca.NO_ALARM
             if target is not None and isfinite(target):
@@ -250,8 +255,9 @@ class MotorRecord:
                 await self._show_target()
             await self._show_moving()
             failure = await self._failure(who, motion)
-            self._alarm = _alarm_of(failure)
-            await ca.show(self._reason, "" if failure is None else str(failure)[:499])
+            if number == self._begun:  # else a newer one has replaced it, and says how it goes
+                self._alarm = _alarm_of(failure)
+                await ca.show(self._reason, "" if failure is None else str(failure)[:499])
             # Whoever may not move has moved nothing; many of them are not to keep others waiting.
             await self.show(await self._commander.look(self._axis) if allowed else None)
             if (failure is not None or target is None) and self._moves == 1:
@@ -298,7 +304,7 @@ class ValueRecord:
 
     def __init__(self, name: str, unit: str) -> None:
         self._value = ca.number(units=unit)
-        self._wave = ca.wave(20_000, unit)
+        self._wave = ca.wave(LONGEST_WAVE, unit)
         self._unit = ca.line(unit)
         self._ends = {"HIHI": ca.number(nan), "LOLO": ca.number(nan)}
         self._alarms = {"STAT": ca.whole(), "SEVR": ca.whole()}
@@ -332,7 +338,7 @@ class ValueRecord:
             await ca.show(self._ends[field], each)
         await self._show_alarm(alarm)
         await ca.show(self._value, value, alarm, units=unit, **bounds)
-        await ca.show(self._wave, samples, alarm)
+        await ca.show(self._wave, samples[-LONGEST_WAVE:], alarm)
         await ca.show(self._unit, unit[:39])
 
     async def look(self, now_s: float) -> None:

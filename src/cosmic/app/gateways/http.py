@@ -15,7 +15,7 @@ from math import inf
 from typing import Any, Final, TypeVar
 
 from starlette.applications import Starlette
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import ClientDisconnect, HTTPConnection, Request
 from starlette.responses import (
     FileResponse,
     HTMLResponse,
@@ -260,10 +260,8 @@ class HttpGateway:
     async def _known(self, request: Request) -> _User:
         kind, _, token = request.headers.get("authorization", "").partition(" ")
         user = self._user_of(token.strip()) if kind.lower() == "bearer" else None
-        where = request.client.host if request.client else "?"
         if user is None:
-            if self._refusals.note(where) > SLOWED_AFTER:
-                await asyncio.sleep(1.0)
+            await self._slow_down(request)
             raise HttpError(401, "send the header Authorization: Bearer TOKEN")
         if not self._lines.know(request.client, user):
             raise HttpError(429, f"a client has at most {MOST_LINES} connections")
@@ -276,6 +274,12 @@ class HttpGateway:
         if not admitted:
             raise HttpError(429, f"more than {MOST_REQUESTS_S:g} requests a second")
         return user
+
+    async def _slow_down(self, stranger: HTTPConnection) -> None:
+        """Have who shows wrong tokens again and again wait for the answer."""
+        where = stranger.client.host if stranger.client else "?"
+        if self._refusals.note(where) > SLOWED_AFTER:
+            await asyncio.sleep(1.0)
 
     def _is_stop(self, request: Request) -> bool:
         """Return whether a request is a command that waits for nothing."""
@@ -379,8 +383,14 @@ class HttpGateway:
     async def _command(self, request: Request, user: _User) -> Response:
         application = request.path_params["application"]
         function, keys = self._address(application, request.path_params["path"])
-        seconds_of(request, "wait", 0.0, LONGEST_WAIT_S)  # refused before anything is carried out
-        arguments = await body_of(request)
+        try:
+            # Refused before anything is carried out; but a stop is, whatever it is said with.
+            seconds_of(request, "wait", 0.0, LONGEST_WAIT_S)
+            arguments = await body_of(request)
+        except HttpError:
+            if not self._is_stop(request):
+                raise
+            arguments = {}
         order = user.session.order(application, function, arguments, keys)
         queue = "stops" if order.found.mark.at_once else application
         result = await self._carried_out(request, user, order, queue)
@@ -560,6 +570,7 @@ class HttpGateway:
             first = await asyncio.wait_for(word_of(socket_), FIRST_WORD_S)
             found = self._user_of(str(first.get("token", "")))
             if found is None:
+                await self._slow_down(socket_)
                 await socket_.close(4401, 'the first message is {"token": ...}')
                 return
             if not self._lines.know(socket_.client, found):

@@ -13,7 +13,7 @@ from cosmic.app.gateways.http_server import BODY_LIMIT_BYTES
 from cosmic.app.gateways.plain import to_json
 from cosmic.frame.errors import MoveRefused
 from cosmic.frame.network.errors import Busy, CallRefused, RemoteDefect
-from cosmic.frame.operation import Operation
+from cosmic.frame.operation import Operation, Progress
 
 
 class HttpError(Exception):
@@ -34,13 +34,18 @@ async def ended(operation: Operation[Any], wait_s: float) -> None:
     """Wait until an operation has ended, at most so long; it goes on whoever is cancelled."""
     loop, over = asyncio.get_running_loop(), asyncio.Event()
 
-    def wake(_operation: object) -> None:
-        with suppress(RuntimeError):
-            loop.call_soon_threadsafe(over.set)
+    def look(progress: Progress) -> None:
+        if progress.done:
+            with suppress(RuntimeError):
+                loop.call_soon_threadsafe(over.set)
 
-    operation.add_callback(wake)
-    with suppress(TimeoutError):
-        await asyncio.wait_for(over.wait(), wait_s)
+    # It is taken back, as a callback cannot be: who waits for hours comes again and again.
+    forget = operation.subscribe(look)
+    try:
+        with suppress(TimeoutError):
+            await asyncio.wait_for(over.wait(), wait_s)
+    finally:
+        forget()
 
 
 async def body_of(request: Request) -> dict[str, Any]:

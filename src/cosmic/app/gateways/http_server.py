@@ -66,6 +66,7 @@ class HttpServer(WorkerThread):
                 timeout_graceful_shutdown=1,
                 h11_max_incomplete_event_size=16 * 1024,
                 server_header=False,
+                proxy_headers=False,  # a line is known by its own address, whatever it says
                 ssl_certfile=settings.certificate or None,
                 ssl_keyfile=settings.key or None,
             )

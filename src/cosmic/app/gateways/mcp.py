@@ -3,7 +3,7 @@
 import json
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
 from typing import Any, Final
 
 from cosmic.app.gateways.catalogue import Command, commands_of
@@ -59,6 +59,8 @@ class McpTools:
     async def answer(self, message: Mapping[str, Any], uses: McpUses) -> dict[str, Any] | None:
         """Return the answer to a message; None to one that wants none."""
         number, method = message.get("id"), message.get("method")
+        if not (number is None or isinstance(number, str | int) or _is_finite(number)):
+            return _error(None, _BAD_REQUEST, "an id is a text or a number")
         if message.get("jsonrpc") != "2.0" or not isinstance(method, str):
             return _error(number, _BAD_REQUEST, "no message of JSON-RPC 2.0")
         if number is None:
@@ -66,20 +68,28 @@ class McpTools:
         parameters = message.get("params", {})
         if not isinstance(parameters, dict):
             return _error(number, _BAD_PARAMS, "params are an object")
+        return await self._answered(number, method, parameters, uses)
+
+    async def _answered(
+        self, number: object, method: str, parameters: Mapping[str, Any], uses: McpUses
+    ) -> dict[str, Any]:
         if method == "initialize":
             return _result(number, _WELCOME)
         if method == "ping":
             return _result(number, {})
         if method == "tools/list":
             return _result(number, {"tools": self._tools})
-        if method == "tools/call":
-            name, given = str(parameters.get("name", "")), parameters.get("arguments", {})
-            if not isinstance(given, dict):
+        if method != "tools/call":
+            return _error(number, _NO_METHOD, f"there is no method {method[:40]!r}")
+        name, given = str(parameters.get("name", "")), parameters.get("arguments", {})
+        if not isinstance(given, dict):
+            found = self._commands.get(name)
+            if found is None or not found.declared.need.at_once:
                 return _error(number, _BAD_PARAMS, "arguments are an object")
-            if name in _FIXED:
-                return await self._done(number, name, given, uses)
-            return await self._called(number, name, given, uses.call)
-        return _error(number, _NO_METHOD, f"there is no method {method[:40]!r}")
+            given = {}  # a stop is carried out whatever it is said with
+        if name in _FIXED:
+            return await self._done(number, name, given, uses)
+        return await self._called(number, name, given, uses.call)
 
     async def _done(
         self, number: object, name: str, given: Mapping[str, Any], uses: McpUses
@@ -110,6 +120,10 @@ class McpTools:
         except CosmicError as exc:
             return _result(number, _failed(exc))
         return _result(number, _said(json.dumps(to_json(result)), failed=False))
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, float) and isfinite(value)
 
 
 def _seconds(given: Mapping[str, Any], name: str, default_s: float, *, least_s: float) -> float:

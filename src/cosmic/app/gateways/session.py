@@ -189,6 +189,9 @@ class GatewaySession:
         known = {name: kind for name, kind in found.parameters.items() if name[0] not in "@#"}
         given: dict[str, object] = {}
         for name, value in arguments.items():
+            if found.ends:
+                given[name] = value
+                continue
             if name not in known:
                 raise CallRefused(
                     f"{function} takes {', '.join(known) or 'nothing'}, not {str(name)[:60]!r}"

@@ -13,6 +13,7 @@ from typing_extensions import override
 from cosmic.daqco.core.settings import OutputSettings
 from cosmic.daqco.hw.interface import Volts
 from cosmic.daqco.hw.outputs import AnalogOutput, BoardOutputs, Waveform
+from cosmic.frame.arguments import reason_of
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ArgumentError, ConfigError, CosmicError, NotAvailable, refusal
 from cosmic.frame.failure import FailurePolicy
@@ -181,7 +182,7 @@ class OutputControl(WorkerThread):
 
         Returns at once and waits for no board.
         """
-        self._stopped = self._stopped or reason or "stopped"
+        self._stopped = self._stopped or reason_of(reason) or "stopped"
         self._unsafe = True
         self._wake.set()
 

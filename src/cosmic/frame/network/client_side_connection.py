@@ -244,6 +244,8 @@ class ClientSideConnection(WorkerThread):
         except StationTimeout as exc:
             if self._session.unanswered_s > SILENCE_LIMIT_S:
                 self._set_away(str(exc))
+        except StationAway:
+            return  # why, is known where it was found
         except CosmicError as exc:
             self._set_away(str(exc))
 

@@ -7,6 +7,7 @@ from itertools import count
 from threading import Lock
 from typing import Any, Final, Protocol, get_origin
 
+from cosmic.frame.arguments import reason_of
 from cosmic.frame.background import BackgroundJobs
 from cosmic.frame.clock import WALL
 from cosmic.frame.declaration import UNKNOWN, CommandDeclaration, result_of
@@ -134,6 +135,11 @@ class StationCommands:
         need = command.need
         if not need.reads and not need.renews:
             self._note_refusal(address, "")
+        if need.at_once:  # it is carried out whatever reason it is given
+            arguments = {
+                name: reason_of(value) if command.parameters.get(name) is str else value
+                for name, value in arguments.items()
+            }
         if need.moves or need.at_once:
             arguments = {**arguments, NUMBER: next(self._numbers)}
         return self._manner(command)(address, command, arguments)

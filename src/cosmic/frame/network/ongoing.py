@@ -11,6 +11,7 @@ from typing import Final, Protocol, runtime_checkable
 import numpy as np
 
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.events import notify
 from cosmic.frame.network.errors import CallRefused, RemoteDefect
 from cosmic.frame.network.transfer import transferable
 from cosmic.frame.network.travelling_errors import to_plain
@@ -168,7 +169,7 @@ class Tickets:
             moving = [ongoing for ongoing, moves in self._running.values() if moves]
         for each in moving:
             if not each.done:
-                each.cancel()
+                notify(each.cancel)  # one that fails leaves nothing else moving
 
     def _follow(self, number: str, ongoing: Ongoing) -> None:
         subscribe = getattr(ongoing, "subscribe", None)

@@ -2,9 +2,11 @@
 
 import inspect
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final, Protocol, TypeVar, get_type_hints, overload, runtime_checkable
 
+from cosmic.frame.arguments import reason_of
 from cosmic.frame.network.caller import MOVE_LIMIT_S
 from cosmic.frame.network.conform import Mismatch, can_check, conform
 from cosmic.frame.network.errors import CallRefused
@@ -84,14 +86,23 @@ class Offered:
     parameters: Mapping[str, Any]
     required: frozenset[str]
 
+    @property
+    def ends(self) -> bool:
+        """It ends something, as a stop does: whatever reason it is given, it is carried out."""
+        return self.mark.at_once and not self.mark.renews
+
     def checked(self, arguments: Mapping[str, object]) -> dict[str, object]:
         """Return the arguments as the function takes them.
+
+        What `ends` something loses those that it does not take.
 
         Raises
         ------
         CallRefused
             One is unknown, missing, or not of its type.
         """
+        if self.ends:
+            arguments = self._taken(arguments)
         surplus = [str(name)[:60] for name in arguments if name not in self.parameters]
         missing = self.required.difference(arguments)
         if surplus or missing:
@@ -110,6 +121,15 @@ class Offered:
                     f"{self.name} was called with a wrong argument {name}: {exc}"
                 ) from exc
         return checked
+
+    def _taken(self, arguments: Mapping[str, object]) -> dict[str, object]:
+        taken: dict[str, object] = {}
+        for name, value in arguments.items():
+            kind = self.parameters.get(name)
+            with suppress(Mismatch):
+                if kind is not None:
+                    taken[name] = reason_of(value) if kind is str else conform(value, kind)
+        return taken
 
 
 @runtime_checkable

@@ -27,7 +27,7 @@ from cosmic.frame.network.errors import CallRefused
 from cosmic.frame.network.messages import Order, read_request, refusal_of
 from cosmic.frame.network.outbox import Outbox
 from cosmic.frame.network.refusals import Refusals
-from cosmic.frame.network.station import Station
+from cosmic.frame.network.station import Station, checked_name
 from cosmic.frame.network.transport import Presence, Rule
 from cosmic.frame.network.wire import Question, Wire, WithLine
 from cosmic.frame.threads import WorkerThread
@@ -156,7 +156,7 @@ class ServerListener(WorkerThread):
         try:
             self._let_in(key, question)
         except CosmicError as exc:
-            logger.warning("%s refused %s: %s", self._station.name, key, exc)
+            logger.warning("%s refused %.80r: %s", self._station.name, key, exc)
             message = refusal_of(self._station.clock.now_s(), exc)
             self._refusals.answer(key.partition("/")[0], question, message)
 
@@ -164,11 +164,14 @@ class ServerListener(WorkerThread):
         if read_request(question.message).order is not Order.HELLO:
             raise ProtocolError("a client has to greet first")
         name, _, number = key.partition("/")
+        try:  # also that no session hears what others ask: an address may stand for many
+            checked_name(name)
+            checked_name(number)
+        except ValueError as exc:
+            raise ProtocolError(f"a client without a name and a number of its own: {exc}") from exc
         access = self._access(name)
         if access is None:
             raise CallRefused(f"{name} is not on the list of those who may connect")
-        if not (name and number) or "/" in number:
-            raise ProtocolError("a client without a name")
         with self._lock:
             if key in self._handlers:
                 raise CallRefused("this session is here already")

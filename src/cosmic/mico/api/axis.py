@@ -10,7 +10,7 @@ from typing import Literal, overload
 from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
 
-from cosmic.frame.arguments import checked_class
+from cosmic.frame.arguments import checked_class, reason_of
 from cosmic.frame.declaration import Declared, command, state
 from cosmic.frame.errors import (
     ArgumentError,
@@ -656,7 +656,7 @@ class Axis(PlanMovable, Declared):
     @override
     def halt(self, why: str = "stopped") -> None:
         """Stop this axis; nothing is latched and other axes go on."""
-        self._manager.device(self._name).halt(self._channel, one_line(why))
+        self._manager.device(self._name).halt(self._channel, one_line(reason_of(why)))
 
     @staticmethod
     def _result(movement: Movement, *, wait: bool) -> float | Movement | None:

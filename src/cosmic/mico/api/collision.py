@@ -26,6 +26,11 @@ class WatchedPlatform(Protocol):
 
     @property
     @abstractmethod
+    def away(self) -> str:
+        """Why the station cannot be reached; empty while it can, and here."""
+
+    @property
+    @abstractmethod
     def taken_out(self) -> tuple[str, ...]:
         """Axes taken out of collision detection."""
 
@@ -86,13 +91,15 @@ class Collision:
         Raises
         ------
         NotAvailable
-            The position of some axis is not known, or no two bodies of the scene are watched.
+            The position of some axis is not known, as of all at a station that is away, or no two
+            bodies of the scene are watched.
         CosmicError
             The collision model does not answer.
         """
         positions = self._platform.positions()
         if positions is None:
-            raise NotAvailable("clearance is not known before every axis is referenced")
+            why = self._platform.away or "the position of every axis has to be known for it"
+            raise NotAvailable(f"clearance is not known: {why}")
         nearest = self._platform.nearest(positions)
         if nearest is None:
             raise NotAvailable("no two bodies of the scene are watched")

@@ -11,7 +11,7 @@ from PySide6.QtCore import Qt
 from typing_extensions import override
 
 from cosmic.frame.application import CosmicApplicationBase
-from cosmic.frame.arguments import checked_class
+from cosmic.frame.arguments import checked_class, reason_of
 from cosmic.frame.clock import Clock
 from cosmic.frame.declaration import Companion, Declared, command, part, state, stream
 from cosmic.frame.errors import (
@@ -37,7 +37,7 @@ from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.companion import MicoCompanion
-from cosmic.mico.api.entry import Number, as_number, one_line, source_of
+from cosmic.mico.api.entry import Number, as_number, source_of
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.live_clearance import LiveClearance
@@ -600,7 +600,11 @@ class Mico(Declared):
             The axes are at a station that cannot be reached. What was begun here stops by itself.
         """
         call = current_call()
-        said = reason if call is None else f"{one_line(reason)} (from {call.caller.name})"
+        said = (
+            reason
+            if call is None
+            else f"{reason_of(reason) or 'stopped'} (from {call.caller.name})"
+        )
         self._manager.stop(said)
 
     @command(moves=True, aside=True)

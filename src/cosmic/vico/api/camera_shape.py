@@ -150,12 +150,12 @@ class CameraShape:
         return [self]
 
     def collect_asset_docs(self, index: int | None = None) -> Iterator[StreamAsset]:
-        """Yield the documents of images that were kept since the last call, in bluesky's terms.
+        """Yield the documents of the image that was kept last, once, in bluesky's terms.
 
         Parameters
         ----------
         index : int or None
-            Bluesky's; each image is told of with the event it belongs to.
+            Bluesky's; each image is told of with the event it belongs to, and no other.
         """
         del index
         found, self._assets = self._assets, ()
@@ -193,7 +193,9 @@ class CameraShape:
             path = self._save(image, self._folder)
             values["file"] = str(path)
             if self._suffix in ARRAY_SUFFIXES:
-                self._assets = (*self._assets, *self._documents(path))
+                # One that no event took, as before a pause, would stand for a second point.
+                folder = [each for each in self._assets if each[0] == "stream_resource"]
+                self._assets = (*folder, *self._documents(path))
         if self._fibres:
             values |= self._measured(image)
         return {

@@ -144,6 +144,18 @@ def test_signs_of_life_that_come_late_do_not_keep_a_motion_alive(bench: Bench) -
     assert dead_man.expired
 
 
+def test_why_a_station_is_away_is_said_once(bench: Bench) -> None:
+    seen: list[Presence] = []
+    bench.client.presence(seen.append)
+    bench.hub.asked.clear()
+    assert wait_until(lambda: not bench.client.state.here)
+    assert not wait_until(lambda: False, 0.3), "it is tried again meanwhile"
+    with pytest.raises(StationAway) as told:
+        bench.client.call("stage", "add", {"a": 1.0})
+    assert str(told.value) == "fibres is away: no answer"
+    assert [each.why for each in seen if not each.here] == ["no answer"]
+
+
 def test_a_task_ends_here_when_the_connection_is_lost(bench: Bench) -> None:
     bench.client.take_lease()
     task = bench.client.call("stage", "travel")

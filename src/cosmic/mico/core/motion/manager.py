@@ -8,6 +8,7 @@ from typing import Final
 
 from PySide6.QtCore import QObject, Qt, Signal
 
+from cosmic.frame.arguments import reason_of
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import (
     CosmicError,
@@ -629,6 +630,7 @@ class DeviceManager(QObject):
         threads repeat it after the call they may be in; they are woken last, so that they don't
         compete for the interpreter, and look at the latch themselves should a call here hang.
         """
+        reason = reason_of(reason)
         self.latch.set(reason)
         error = refusal(refuse(Reason.STOPPED, f"stopped: {reason}"))
         devices = list(self._devices.values())
