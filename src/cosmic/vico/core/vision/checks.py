@@ -28,6 +28,7 @@ EDGING = "it lies along the edge of something wider"
 DIRTY_END = "at an end its edges are not seen: dirt may lie there"
 DRAWN = "it is as straight and as even as a line drawn into the picture: a scale bar, or a frame"
 SHARP = "it bends more sharply than its own width"
+EMBOSSED = "as dark a band and as light a one lie along each other: a scratch, or lit from a side"
 # Of stretches along a fibre, what such a share differ by at most is its own unevenness.
 OWN_UNEVENNESS = 0.9
 
@@ -50,7 +51,10 @@ class Limits:
     seen: float = 0.6
     gap_widths: float = 14.0
     aslant_px: float = 0.3
+    several_aslant_px: float = 0.5
+    several_aslant: float = 2e-3
     even_of_noise: float = 0.8
+    other_side: float = 0.3
 
 
 LIMITS = Limits()
@@ -68,6 +72,7 @@ def doubts_of(course: Course, step: float) -> list[str]:
     reasons = (
         (course.blur_px > min(blurred_px, LIMITS.blur_most_px), OUT_OF_FOCUS),
         (parted(course), PARTED),
+        (embossed(course), EMBOSSED),
         (edging(course, typical) > LIMITS.edging, EDGING),
         (typical < max(LIMITS.contrast_to_noise * course.noise, LIMITS.levels * step), FAINT),
         (fades(course, typical), FADES),
@@ -84,6 +89,18 @@ def parted(course: Course) -> bool:
     """Return whether the ground shows in the middle of a fibre, as between two fibres."""
     inner = course.mean[np.abs(course.across) < 0.3 * course.width]
     return len(inner) > 0 and float(np.abs(inner).min()) < LIMITS.dip
+
+
+def embossed(course: Course) -> bool:
+    """Return whether what is as far beyond the ground as the fibre lies along one side of it.
+
+    Sharpening and phase contrast leave a seam along both sides.
+    """
+    sides = [
+        course.mean[side * course.across > 0.5 * course.width].min(initial=0.0) for side in (-1, 1)
+    ]
+    low, high = float(min(sides)), float(max(sides))
+    return low < -LIMITS.other_side and high - low > LIMITS.other_side
 
 
 def edging(course: Course, typical: float) -> float:
@@ -200,10 +217,28 @@ def outward(line: Floats, at: int) -> Floats:
     return np.asarray(step / max(float(np.linalg.norm(step)), 1e-9))
 
 
-def is_drawn(scene: Scene, course: Course) -> bool:
-    """Return whether it lies along rows or columns, and has less noise than the ground."""
-    if float(np.ptp(course.line, axis=0).min()) > LIMITS.aslant_px:
-        return False
+def drawn(scene: Scene, courses: Sequence[Course]) -> set[int]:
+    """Return the lines that are drawn along rows or columns.
+
+    They have less noise than the ground; or there are several, from end to end on the image or
+    from border to border: no two fibres come to lie like that.
+    """
+    even, whole = set(), set()
+    for index, course in enumerate(courses):
+        aside, length = np.sort(np.ptp(course.line, axis=0)).tolist()
+        if aside <= LIMITS.aslant_px and _is_even(scene, course):
+            even.add(index)
+        kinds = {end.kind for end in course.ends}
+        if aside <= max(LIMITS.several_aslant_px, LIMITS.several_aslant * length) and (
+            kinds in ({EndKind.FREE}, {EndKind.BORDER})
+        ):
+            whole.add(index)
+    several = even | whole
+    return several if len(several) > 1 else even
+
+
+def _is_even(scene: Scene, course: Course) -> bool:
+    """Return whether a line has less noise than the ground."""
     x, y = (course.line[:, axis].astype(np.float32)[None] for axis in (0, 1))
     levels = sample(scene.image, x, y)[0].astype(np.float64)
     inner = levels[len(levels) // 8 : len(levels) - len(levels) // 8]

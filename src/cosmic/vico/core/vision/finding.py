@@ -263,36 +263,39 @@ def checked_fibres(
     scene: Scene, courses: list[tuple[Strand, Course]], *, crowd: bool
 ) -> list[Fibre]:
     """Return the fibres, the longest first, with what is doubtful about them together."""
-    lines = [course.line for _, course in courses]
-    widths = [course.width for _, course in courses]
-    apart = checks.continued([course for _, course in courses])
+    measured = [course for _, course in courses]
+    lines = [course.line for course in measured]
+    widths = [course.width for course in measured]
     explained = explained_by(scene, lines, widths)
-    beside = left_over(scene, lines, widths, explained)
-    sections = pooled([section_of(scene, course) for _, course in courses])
+    together = (
+        (checks.drawn(scene, measured), checks.DRAWN),
+        (set(range(len(courses))) if crowd else set(), checks.CROWDED),
+        (checks.continued(measured), checks.CONTINUES),
+        (left_over(scene, lines, widths, explained), checks.LEFT_OVER),
+    )
+    sections = pooled([section_of(scene, course) for course in measured])
     found = []
     for index, (strand, course) in enumerate(courses):
         signs = certainty.signs_of(scene, course, explained)
         doubts = [*strand.doubts, *checks.doubts_of(course, scene.step), *signs.doubts]
-        if not signs.joints.checked:
-            doubts.append(axial.UNCHECKED)
-        if sections[index].hollow > MOST_HOLLOW:
-            doubts.append(checks.PARTED)
-        if touches_border(scene, course):
-            doubts.append(EndKind.BORDER.value)
-        if picture_edge.is_cut(
-            scene, course, explained, compressed=signs.compressed > certainty.NOISE
-        ):
-            doubts.append(picture_edge.CUT)
-        if checks.is_drawn(scene, course):
-            doubts.append(checks.DRAWN)
-        if crowd:
-            doubts.append(checks.CROWDED)
-        if index in apart:
-            doubts.append(checks.CONTINUES)
-        if index in beside:
-            doubts.append(checks.LEFT_OVER)
+        doubts += doubts_by_itself(scene, course, sections[index], signs, explained)
+        doubts += [reason for which, reason in together if index in which]
         found.append(fibre(scene, course, sections[index], doubts, signs))
     return sorted(found, key=lambda each: -each.length_px)
+
+
+def doubts_by_itself(
+    scene: Scene, course: Course, section: Section, signs: certainty.Signs, explained: Mask
+) -> list[str]:
+    """Return what is doubtful about a fibre where it lies on the image."""
+    compressed = signs.compressed > certainty.NOISE
+    reasons = (
+        (not signs.joints.checked, axial.UNCHECKED),
+        (section.hollow > MOST_HOLLOW, checks.PARTED),
+        (touches_border(scene, course), EndKind.BORDER.value),
+        (picture_edge.is_cut(scene, course, explained, compressed=compressed), picture_edge.CUT),
+    )
+    return [reason for doubtful, reason in reasons if doubtful]
 
 
 def touches_border(scene: Scene, course: Course) -> bool:
