@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.frame.errors import NotAvailable
-from cosmic.vico.core.vision import axial, certainty, checks, picture_edge
+from cosmic.vico.core.vision import axial, beyond, certainty, checks, fragments, picture_edge
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
@@ -270,7 +270,10 @@ def checked_fibres(
     together = (
         (checks.drawn(scene, measured), checks.DRAWN),
         (set(range(len(courses))) if crowd else set(), checks.CROWDED),
-        (checks.continued(measured), checks.CONTINUES),
+        (
+            checks.continued(measured) | fragments.broken_off(scene, measured, explained),
+            checks.CONTINUES,
+        ),
         (left_over(scene, lines, widths, explained), checks.LEFT_OVER),
     )
     sections = pooled([section_of(scene, course) for course in measured])
@@ -294,6 +297,7 @@ def doubts_by_itself(
         (section.hollow > MOST_HOLLOW, checks.PARTED),
         (touches_border(scene, course), EndKind.BORDER.value),
         (picture_edge.is_cut(scene, course, explained, compressed=compressed), picture_edge.CUT),
+        (beyond.is_covered(scene, course), beyond.COVERED),
     )
     return [reason for doubtful, reason in reasons if doubtful]
 
