@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from cosmic.vico.core.vision.checks import DRAWN, EMBOSSED
+from cosmic.vico.core.vision.copies import COPY
 from cosmic.vico.core.vision.finding import find_fibres
 from unit.vico.vision.drawn_fibres import arc, drawn_image, strip
 
@@ -40,3 +41,28 @@ def test_several_lines_along_rows_and_columns_are_drawn() -> None:
     found = find_fibres(drawn_image([down, along, fibre], [7.0, 7.0, 9.0]))
     assert [round(each.length_px) for each in found if each.certain] == [200]
     assert sum(DRAWN in each.doubts for each in found) == 2
+
+
+def test_the_weaker_of_two_that_are_alike_is_a_reflection() -> None:
+    line = arc((120.0, 120.0), 0.5, 320.0, 0.5)
+    image = drawn_image([line], [9.0], noise=2.0).astype(np.float32)
+    ghost = 0.75 * image + 0.25 * np.roll(image, (-70, 40), axis=(0, 1))
+    found = find_fibres(np.round(ghost).astype(np.uint8))
+    assert [each.certain for each in sorted(found, key=lambda each: -each.contrast)] == [
+        True,
+        False,
+    ]
+    assert COPY in min(found, key=lambda each: each.contrast).doubts
+
+
+def test_marks_of_a_frame_that_is_turned_are_copies() -> None:
+    centre, half = np.array([320.0, 240.0]), 45.0
+    lines = []
+    for number in range(4):
+        angle = 0.12 + 0.5 * np.pi * number
+        out = np.array([np.cos(angle), np.sin(angle)])
+        along = np.array([-out[1], out[0]])
+        lines.append(centre + 180.0 * out + np.linspace(-half, half, 400)[:, None] * along)
+    found = find_fibres(drawn_image(lines, [7.0] * 4))
+    assert len(found) == 4
+    assert all(COPY in each.doubts for each in found)

@@ -7,7 +7,15 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.frame.errors import NotAvailable
-from cosmic.vico.core.vision import axial, beyond, certainty, checks, fragments, picture_edge
+from cosmic.vico.core.vision import (
+    axial,
+    beyond,
+    certainty,
+    checks,
+    copies,
+    fragments,
+    picture_edge,
+)
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
@@ -269,6 +277,7 @@ def checked_fibres(
     explained = explained_by(scene, lines, widths)
     together = (
         (checks.drawn(scene, measured), checks.DRAWN),
+        (copies.copied(measured), copies.COPY),
         (set(range(len(courses))) if crowd else set(), checks.CROWDED),
         (
             checks.continued(measured) | fragments.broken_off(scene, measured, explained),
