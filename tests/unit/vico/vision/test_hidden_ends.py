@@ -49,3 +49,13 @@ def test_a_speck_near_an_end_is_no_fragment() -> None:
     ahead = LINE[-1] - LINE[-40]
     at = LINE[-1] + 40.0 * ahead / np.linalg.norm(ahead)
     assert only(spotted(image, at, 2.5, 100.0)).certain
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("shift", [18, 45])
+def test_a_fibre_torn_with_its_image_is_not_certain(turned: bool, shift: int) -> None:
+    image = drawn_image([arc((120.0, 200.0), 0.15, 380.0, 0.2)], [9.0])
+    torn = np.hstack([image[:, :310], np.roll(image, shift, axis=0)[:, 310:]])
+    found = find_fibres(np.ascontiguousarray(torn.T) if turned else torn)
+    assert len(found) == 2
+    assert all(CONTINUES in each.doubts for each in found)

@@ -33,7 +33,7 @@ SHARE: Final = 0.07
 SOFT_BLURS: Final = 3.0
 SOFT_WIDTHS: Final = 0.6
 # Of the fibre's contrast, from which what lies before an end is something.
-COVER_SHARE: Final = 0.2
+COVER_SHARE: Final = 0.1
 
 
 def goes_on(scene: Scene, course: Course, explained: Mask) -> float:

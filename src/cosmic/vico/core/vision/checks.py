@@ -28,7 +28,7 @@ EDGING = "it lies along the edge of something wider"
 DIRTY_END = "at an end its edges are not seen: dirt may lie there"
 DRAWN = "it is as straight and as even as a line drawn into the picture: a scale bar, or a frame"
 SHARP = "it bends more sharply than its own width"
-EMBOSSED = "as dark a band and as light a one lie along each other: a scratch, or lit from a side"
+EMBOSSED = "a dark band and a light one lie along each other: a scratch, or lit from a side"
 # Of stretches along a fibre, what such a share differ by at most is its own unevenness.
 OWN_UNEVENNESS = 0.9
 
@@ -54,7 +54,9 @@ class Limits:
     several_aslant_px: float = 0.5
     several_aslant: float = 2e-3
     even_of_noise: float = 0.8
-    other_side: float = 0.3
+    other_side: float = 0.2
+    torn_px: float = 1.5
+    torn_reach_px: float = 64.0
 
 
 LIMITS = Limits()
@@ -92,7 +94,7 @@ def parted(course: Course) -> bool:
 
 
 def embossed(course: Course) -> bool:
-    """Return whether what is as far beyond the ground as the fibre lies along one side of it.
+    """Return whether a band beyond the ground, the other way, lies along one side of a fibre.
 
     Sharpening and phase contrast leave a seam along both sides.
     """
@@ -196,7 +198,7 @@ def continued(courses: Sequence[Course]) -> set[int]:
         return found
     widths = [each.width for each in courses]
     points = np.array([point for _, point, _, _ in ends])
-    for first, last in cKDTree(points).query_pairs(4.0 * max(widths) + 30.0):
+    for first, last in cKDTree(points).query_pairs(4.0 * max(widths) + LIMITS.torn_reach_px):
         (i, point, out, runs), (j, other, other_out, other_runs) = ends[first], ends[last]
         step = other - point
         gap = float(np.linalg.norm(step))
@@ -207,7 +209,23 @@ def continued(courses: Sequence[Course]) -> set[int]:
             step /= max(gap, 1e-9)
             if float(out @ step) > 0.8 and float(other_out @ -step) > 0.8:
                 found |= {i, j}
+        if i != j and _torn(other - point, out, other_out):
+            found |= {i, j}
     return found
+
+
+def _torn(step: Floats, out: Floats, other_out: Floats) -> bool:
+    """Return whether two ends face each other across a row or a column, shifted along it.
+
+    So an image is torn whose halves were taken one after another, or put together.
+    """
+    across = int(np.argmin(np.abs(step)))
+    return (
+        float(np.abs(step).min()) < LIMITS.torn_px
+        and float(np.abs(step).max()) < LIMITS.torn_reach_px
+        and float(out @ other_out) < -0.8
+        and float(out[across] * other_out[across]) < -0.1
+    )
 
 
 def outward(line: Floats, at: int) -> Floats:
