@@ -59,3 +59,17 @@ def test_a_fibre_torn_with_its_image_is_not_certain(turned: bool, shift: int) ->
     found = find_fibres(np.ascontiguousarray(torn.T) if turned else torn)
     assert len(found) == 2
     assert all(CONTINUES in each.doubts for each in found)
+
+
+@pytest.mark.parametrize("contrast", [-110.0, -150.0])
+def test_a_length_on_a_clipped_ground_is_known_as_well_as_its_interval_says(
+    contrast: float,
+) -> None:
+    image = drawn_image([LINE], [9.0], contrast=contrast, ground=300.0, noise=5.0, blur_px=1.5)
+    assert np.median(image) == 255
+    found = only(image)
+    low, high = found.length_interval_px
+    assert low <= 320.0 <= high
+    short = arc((120.0, 120.0), 0.5, 80.0, 0.5)
+    image = drawn_image([short], [9.0], contrast=contrast, ground=300.0, noise=5.0, blur_px=1.5)
+    assert not only(image).certain

@@ -57,6 +57,8 @@ class Limits:
     other_side: float = 0.2
     torn_px: float = 1.5
     torn_reach_px: float = 64.0
+    clipped: float = 0.005
+    same_level: float = 0.01
 
 
 LIMITS = Limits()
@@ -233,6 +235,19 @@ def outward(line: Floats, at: int) -> Floats:
     inner = min(8, len(line) - 1)
     step = line[0] - line[inner] if at == 0 else line[-1] - line[-1 - inner]
     return np.asarray(step / max(float(np.linalg.norm(step)), 1e-9))
+
+
+def is_clipped(scene: Scene, course: Course) -> bool:
+    """Return whether the ground is at the end of the range, without noise, and the fibre is not."""
+    if course.noise > 0.0 or not course.good.any():
+        return False
+    ground = middle(scene.sign * course.ground)
+    if ground > float((scene.sign * scene.image).min()) + LIMITS.same_level:
+        return False
+    x, y = (course.line[:, axis].astype(np.float32)[None] for axis in (0, 1))
+    levels = sample(scene.image, x, y)[0].astype(np.float64)
+    spread = middle(np.abs(levels - middle(levels)))
+    return spread > LIMITS.clipped * middle(course.contrast[course.good])
 
 
 def drawn(scene: Scene, courses: Sequence[Course]) -> set[int]:

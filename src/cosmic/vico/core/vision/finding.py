@@ -49,6 +49,8 @@ LEAST_PX = 12.0
 LEAST_OF_IMAGE = 0.025
 # Lighter inside, it is ground between two fibres and no hollow.
 MOST_HOLLOW = 0.8
+# Of the blur of its edges, by which a fibre on a clipped ground is too short.
+CLIPPED_BLURS = 1.5
 # More cannot be told apart in time, nor in a network at all.
 MOST_STRANDS = 96
 
@@ -160,7 +162,8 @@ def fibre(
     widths *= width / float(widths.mean())
     kinks = kink_angles_deg(line, width)
     ends_std = np.array([end.std_px for end in course.ends])
-    length_std = length_deviation(course, length)
+    clipped = checks.is_clipped(scene, course)
+    length_std = length_deviation(course, length, clipped=clipped)
     if length_std > 0.01 * length:
         doubts.append(checks.IMPRECISE)
     whole = certainty.probability(signs, doubts)
@@ -198,12 +201,16 @@ def fibre(
     )
 
 
-def length_deviation(course: Course, length: float) -> float:
-    """Return the standard deviation of the length."""
+def length_deviation(course: Course, length: float, *, clipped: bool) -> float:
+    """Return the standard deviation of the length.
+
+    Where the ground is clipped nobody sees where a half of the contrast would have been.
+    """
     ends = sum(end.std_px**2 for end in course.ends)
     hidden = float((~course.good).sum()) * 2.0
     dirt = 2.0 * max(0.0, checks.uneven_ends(course) - 1.0)
-    return float(np.sqrt(ends + (2e-4 * length) ** 2 + (0.004 * hidden) ** 2 + dirt**2))
+    edges = CLIPPED_BLURS * course.edge_blur_px if clipped else 0.0
+    return float(np.sqrt(ends + (2e-4 * length) ** 2 + (0.004 * hidden) ** 2 + dirt**2 + edges**2))
 
 
 def width_deviation(course: Course, section: Section) -> float:
