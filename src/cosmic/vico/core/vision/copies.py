@@ -1,4 +1,4 @@
-"""What is on an image twice: a reflection, a double exposure, letters, the marks of a frame."""
+"""What is on an image twice: a reflection, or the marks of a frame."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -10,31 +10,32 @@ from cosmic.vico.core.vision.grey import Floats, middle
 from cosmic.vico.core.vision.refine import Course
 from cosmic.vico.core.vision.smoothing import arc_lengths
 
-COPY: Final = "another one has the same shape: a reflection, a double exposure, or something drawn"
+COPY: Final = "another one has the same shape: it may be a reflection, or a mark that was drawn"
 
 POINTS: Final = 9
 """At which courses are compared."""
 ALIKE_PX: Final = 1.5
 WEAKER: Final = 0.75
-"""Of the contrast of another one: then only the weaker is the copy."""
+"""Of the contrast of another one: then it is the copy."""
 QUARTER: Final = np.array([[0.0, 1.0], [-1.0, 0.0]])
 
 
 def copied(courses: Sequence[Course]) -> set[int]:
-    """Return the fibres of which another one is a copy, moved or turned by quarters.
+    """Return the fibres of which another one is a copy: moved and stronger, or turned by a quarter.
 
-    No two fibres are so alike. Where one is much weaker than the other, it alone is the copy.
+    Fibres as strong as each other may lie side by side alike, as cut and combed; not across.
     """
     shapes = [_shape(course.line) for course in courses]
     contrasts = [middle(each.contrast[each.good]) if each.good.any() else 0.0 for each in courses]
     found: set[int] = set()
     for i, j in combinations(range(len(courses)), 2):
-        if not _same(shapes[i], shapes[j]):
-            continue
-        if contrasts[j] > WEAKER * contrasts[i]:
-            found.add(i)
-        if contrasts[i] > WEAKER * contrasts[j]:
-            found.add(j)
+        if _same(shapes[i], shapes[j] @ QUARTER):
+            found |= {i, j}
+        elif _same(shapes[i], shapes[j]):
+            if contrasts[i] < WEAKER * contrasts[j]:
+                found.add(i)
+            elif contrasts[j] < WEAKER * contrasts[i]:
+                found.add(j)
     return found
 
 
@@ -47,9 +48,8 @@ def _shape(line: Floats) -> Floats:
 
 
 def _same(one: Floats, other: Floats) -> bool:
-    for _ in range(4):
-        other = other @ QUARTER
-        for there in (other, other[::-1]):
-            if float(np.linalg.norm(one - there, axis=1).max()) < ALIKE_PX:
-                return True
-    return False
+    """Return whether two are alike as they are, or turned by half."""
+    return any(
+        float(np.linalg.norm(one - there, axis=1).max()) < ALIKE_PX
+        for there in (other, other[::-1], -other, -other[::-1])
+    )
