@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from cosmic.frame.errors import ConfigError, CosmicError, RecordingError
-from cosmic.frame.interruption import Interrupted
+from cosmic.frame.interruption import Interrupted, held_back
 from cosmic.vico.api.measure import (
     NOT_KNOWN,
     SUFFIXES,
@@ -83,7 +83,8 @@ def run(chosen: argparse.Namespace) -> int:
         ended = _measured_all(files, folder, chosen, results)
     finally:  # what was measured is kept whatever ends the run
         if results.measured:  # else they would be in the way of the next run
-            _write_tables(folder, results, spatial=chosen.focal_stack)
+            with held_back():  # a second signal, as `timeout` sends, leaves no half
+                _write_tables(folder, results, spatial=chosen.focal_stack)
     text = summary(results.measured, len(results.refused), len(results.pages_refused))
     where = f"{folder}\n" if results.measured else ""
     sys.stdout.write(encoded(f"{text}{where}").decode())

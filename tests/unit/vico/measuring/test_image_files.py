@@ -1,6 +1,7 @@
 """Files of other programs: the pixel size of each page, and files that are damaged."""
 
 import io
+import os
 import struct
 import zlib
 from collections.abc import Callable
@@ -263,7 +264,7 @@ def test_a_small_file_that_declares_a_huge_image_is_refused(
         list(read_images(file))
 
 
-@pytest.mark.parametrize("name", ["empty.png", "empty.jpg"])
+@pytest.mark.parametrize("name", ["empty.png", "empty.jpg", "empty.tif", "empty.mp4"])
 def test_an_empty_image_is_called_empty(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(b"")
     with pytest.raises(RecordingError, match=r"is empty") as caught:
@@ -281,6 +282,16 @@ def test_what_is_missing_or_a_folder_is_called_so(tmp_path: Path) -> None:
     ):
         with pytest.raises(RecordingError, match=said):
             list(read_images(path))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="has no pipes with a name")
+@pytest.mark.parametrize("name", ["pipe.png", "pipe.tif", "pipe.avi"])
+def test_a_pipe_that_nobody_writes_to_is_refused_and_not_waited_for(
+    tmp_path: Path, name: str
+) -> None:
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(RecordingError, match="is a pipe or a device"):
+        list(read_images(tmp_path / name))
 
 
 def film(path: Path, images: int = 8) -> Path:

@@ -5,7 +5,7 @@ import json
 import os
 import re
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cv2
@@ -17,7 +17,14 @@ import cosmic
 from cosmic.app.cli import main
 from cosmic.app.commands import measure as command
 from cosmic.frame.errors import ConfigError
-from cosmic.vico.api.measure import FileImage, Measurement, measure_page, measure_stack, read_images
+from cosmic.vico.api.measure import (
+    FileImage,
+    Measurement,
+    measure_page,
+    measure_stack,
+    read_images,
+    write_csv,
+)
 from cosmic.vico.core.measuring import measurement
 from unit.vico.measuring.test_image_files import damaged_page, film
 from unit.vico.vision.drawn_fibres import arc, drawn_image
@@ -83,6 +90,29 @@ def test_what_ends_it_keeps_what_was_measured(
     assert [row["image"] for row in rows_of(out / "fibres.csv")] == ["a.png", "b.tif page 1"]
     assert (out / "report.md").exists()
     assert "interrupted at file 2 of 2" in capsys.readouterr().err
+
+
+def test_a_second_signal_leaves_no_half_of_the_tables(
+    image: Path, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cv2.imwrite(str(image.with_name("b.png")), IMAGE)
+
+    def until_second(page: FileImage, size: float | None = None) -> Measurement:
+        if page.name == "b.png":
+            signal.raise_signal(signal.SIGTERM)
+        return measure_page(page, size)
+
+    def signalled(path: Path, measured: Sequence[Measurement], *, spatial: bool) -> None:
+        signal.raise_signal(signal.SIGTERM)
+        write_csv(path, measured, spatial=spatial)
+
+    monkeypatch.setattr(command, "measure_page", until_second)
+    monkeypatch.setattr(command, "write_csv", signalled)
+    assert main(["measure", str(image.parent), "--output", str(out)]) == 143
+    assert [row["image"] for row in rows_of(out / "fibres.csv")] == ["a.png"]
+    (whole,) = json.loads((out / "fibres.json").read_text(encoding="utf-8"))["images"]
+    assert whole["image"] == "a.png"
+    assert (out / "report.md").exists()
 
 
 def test_an_error_nobody_foresaw_keeps_what_was_measured(

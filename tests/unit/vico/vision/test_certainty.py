@@ -12,6 +12,7 @@ from benchmarks.certainty import (
     cases,
     drawn_cases,
     examples,
+    field_of_twenty,
     fit,
     split,
     wrong,
@@ -59,6 +60,11 @@ def test_a_gap_of_half_a_width_is_found_as_two_drawn_in_another_way() -> None:
             gaps += 1
             both += sum(case.right for case in found) == 2
     assert both >= 0.8 * gaps
+
+
+def test_a_crossing_of_which_a_short_end_is_not_seen_is_not_read_with_certainty() -> None:
+    image, lines = field_of_twenty(502)
+    assert wrong(cases(find_fibres(image), lines)) == 0
 
 
 def test_a_fibre_that_goes_on_thinner_is_not_certain() -> None:

@@ -47,7 +47,8 @@ def read_images(path: Path, every: int = 1, refused: Refused | None = None) -> I
 
 def _check_there(path: Path) -> None:
     try:
-        there, folder = path.exists(), path.is_dir()
+        there, folder, kept = path.exists(), path.is_dir(), path.is_file()
+        empty = kept and not path.stat().st_size
     except (OSError, ValueError) as exc:  # a name that no file can have
         why = getattr(exc, "strerror", None) or exc
         raise RecordingError(f"{str(path)[:80]}: cannot be read ({why})") from exc
@@ -58,13 +59,15 @@ def _check_there(path: Path) -> None:
         raise RecordingError(f"{path}: is a folder, not an image")
     if kinds:
         raise RecordingError(f"{path}: {kinds}")
+    if not kept:  # reading a pipe would wait for whoever writes to it
+        raise RecordingError(f"{path}: is a pipe or a device, not an image")
+    if empty:
+        raise RecordingError(f"{path}: is empty; copy it again from where it was made")
 
 
 def _still(path: Path) -> FileImage:
     with reading(str(path)):
         coded = path.read_bytes()
-        if not coded:
-            raise RecordingError(f"{path}: is empty; copy it again from where it was made")
         pixels = cv2.imdecode(np.frombuffer(coded, np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None:
         raise RecordingError(f"{path}: is no image, or damaged")

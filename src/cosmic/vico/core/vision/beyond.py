@@ -10,13 +10,15 @@ from typing import Final
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
-from cosmic.vico.core.vision.ends import EndKind
+from cosmic.vico.core.vision.ends import EndKind, bent, leaving
 from cosmic.vico.core.vision.grey import Floats, Mask, middle
-from cosmic.vico.core.vision.profiles import Flags, Scene, sample
+from cosmic.vico.core.vision.profiles import Flags, Scene, sample, within
 from cosmic.vico.core.vision.refine import Course
+from cosmic.vico.core.vision.smoothing import directions
 
 GOES_ON = "something thinner or fainter goes on beyond an end: it may be a part of a fibre"
 SOFT = "an end is less sharp than the image, so that the fibre may go on"
+COVERED = "something of the other shade than the fibre lies at an end, and may cover a part of it"
 
 RAYS: Final = 144
 AHEAD_DEG: Final = 80.0
@@ -30,6 +32,8 @@ SHARE: Final = 0.07
 # How far an end is blurred: by the image, by a slanting or round cut.
 SOFT_BLURS: Final = 3.0
 SOFT_WIDTHS: Final = 0.6
+# Of the fibre's contrast, from which what lies before an end is something.
+COVER_SHARE: Final = 0.1
 
 
 def goes_on(scene: Scene, course: Course, explained: Mask) -> float:
@@ -52,6 +56,44 @@ def soft(course: Course) -> float:
     blur = course.edge_blur_px
     usual = SOFT_BLURS * blur + SOFT_WIDTHS * course.width
     return max([0.0, *(end.soft_px / usual for end in course.ends if end.kind is EndKind.FREE)])
+
+
+def is_covered(scene: Scene, course: Course) -> bool:
+    """Return whether the ground before a free end is lighter than beside a darker fibre.
+
+    (Darker, for a lighter one.) What sharpening leaves before an end it leaves beside it as well.
+    """
+    contrast = middle(course.contrast[course.good]) if course.good.any() else 1.0
+    size = max(4.0, 0.8 * course.width)
+    first = 1.5 * course.edge_blur_px + 1.0
+    least = max(COVER_SHARE * contrast, TIMES * course.noise / size)
+    away = first + np.arange(size)
+    for at, end in zip((0, -1), course.ends, strict=True):
+        if end.kind is not EndKind.FREE:
+            continue
+        line = course.line if at else course.line[::-1]
+        half = max(1.0, 0.4 * course.width)
+        before = _level(scene, line, away, np.arange(-half, half + 0.5))
+        inner = -np.arange(course.width, 4.0 * course.width)
+        beside = [
+            _level(scene, line, inner, side * (0.5 * course.width + away)) for side in (-1.0, 1.0)
+        ]
+        if min(beside) - before > least:
+            return True
+    return False
+
+
+def _level(scene: Scene, line: Floats, along: Floats, across: Floats) -> float:
+    """Return how far what lies along, and across, from an end stands out as the fibre does."""
+    axis = bent(line, leaving(line, float(len(across))), along)
+    tangent = directions(axis)
+    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+    points = axis[:, None] + across[None, :, None] * normal[:, None]
+    x, y = (points[..., n].astype(np.float32) for n in (0, 1))
+    inside = within(scene, x, y)
+    if not inside.any():
+        return 0.0
+    return scene.sign * middle(sample(scene.image, x, y)[inside].astype(np.float64))
 
 
 def _rays(scene: Scene, course: Course, at: int, explained: Mask) -> float:

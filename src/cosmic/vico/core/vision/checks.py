@@ -28,6 +28,7 @@ EDGING = "it lies along the edge of something wider"
 DIRTY_END = "at an end its edges are not seen: dirt may lie there"
 DRAWN = "it is as straight and as even as a line drawn into the picture: a scale bar, or a frame"
 SHARP = "it bends more sharply than its own width"
+EMBOSSED = "a dark band and a light one lie along each other: a scratch, or lit from a side"
 # Of stretches along a fibre, what such a share differ by at most is its own unevenness.
 OWN_UNEVENNESS = 0.9
 
@@ -50,7 +51,14 @@ class Limits:
     seen: float = 0.6
     gap_widths: float = 14.0
     aslant_px: float = 0.3
+    several_aslant_px: float = 0.5
+    several_aslant: float = 2e-3
     even_of_noise: float = 0.8
+    other_side: float = 0.2
+    torn_px: float = 1.5
+    torn_reach_px: float = 64.0
+    clipped: float = 0.005
+    same_level: float = 0.01
 
 
 LIMITS = Limits()
@@ -68,6 +76,7 @@ def doubts_of(course: Course, step: float) -> list[str]:
     reasons = (
         (course.blur_px > min(blurred_px, LIMITS.blur_most_px), OUT_OF_FOCUS),
         (parted(course), PARTED),
+        (embossed(course), EMBOSSED),
         (edging(course, typical) > LIMITS.edging, EDGING),
         (typical < max(LIMITS.contrast_to_noise * course.noise, LIMITS.levels * step), FAINT),
         (fades(course, typical), FADES),
@@ -84,6 +93,18 @@ def parted(course: Course) -> bool:
     """Return whether the ground shows in the middle of a fibre, as between two fibres."""
     inner = course.mean[np.abs(course.across) < 0.3 * course.width]
     return len(inner) > 0 and float(np.abs(inner).min()) < LIMITS.dip
+
+
+def embossed(course: Course) -> bool:
+    """Return whether a band beyond the ground, the other way, lies along one side of a fibre.
+
+    Sharpening and phase contrast leave a seam along both sides.
+    """
+    sides = [
+        course.mean[side * course.across > 0.5 * course.width].min(initial=0.0) for side in (-1, 1)
+    ]
+    low, high = float(min(sides)), float(max(sides))
+    return low < -LIMITS.other_side and high - low > LIMITS.other_side
 
 
 def edging(course: Course, typical: float) -> float:
@@ -179,7 +200,7 @@ def continued(courses: Sequence[Course]) -> set[int]:
         return found
     widths = [each.width for each in courses]
     points = np.array([point for _, point, _, _ in ends])
-    for first, last in cKDTree(points).query_pairs(4.0 * max(widths) + 30.0):
+    for first, last in cKDTree(points).query_pairs(4.0 * max(widths) + LIMITS.torn_reach_px):
         (i, point, out, runs), (j, other, other_out, other_runs) = ends[first], ends[last]
         step = other - point
         gap = float(np.linalg.norm(step))
@@ -190,7 +211,23 @@ def continued(courses: Sequence[Course]) -> set[int]:
             step /= max(gap, 1e-9)
             if float(out @ step) > 0.8 and float(other_out @ -step) > 0.8:
                 found |= {i, j}
+        if i != j and _torn(other - point, out, other_out):
+            found |= {i, j}
     return found
+
+
+def _torn(step: Floats, out: Floats, other_out: Floats) -> bool:
+    """Return whether two ends face each other across a row or a column, shifted along it.
+
+    So an image is torn whose halves were taken one after another, or put together.
+    """
+    across = int(np.argmin(np.abs(step)))
+    return (
+        float(np.abs(step).min()) < LIMITS.torn_px
+        and float(np.abs(step).max()) < LIMITS.torn_reach_px
+        and float(out @ other_out) < -0.8
+        and float(out[across] * other_out[across]) < -0.1
+    )
 
 
 def outward(line: Floats, at: int) -> Floats:
@@ -200,10 +237,41 @@ def outward(line: Floats, at: int) -> Floats:
     return np.asarray(step / max(float(np.linalg.norm(step)), 1e-9))
 
 
-def is_drawn(scene: Scene, course: Course) -> bool:
-    """Return whether it lies along rows or columns, and has less noise than the ground."""
-    if float(np.ptp(course.line, axis=0).min()) > LIMITS.aslant_px:
+def is_clipped(scene: Scene, course: Course) -> bool:
+    """Return whether the ground is at the end of the range, without noise, and the fibre is not."""
+    if course.noise > 0.0 or not course.good.any():
         return False
+    ground = middle(scene.sign * course.ground)
+    if ground > float((scene.sign * scene.image).min()) + LIMITS.same_level:
+        return False
+    x, y = (course.line[:, axis].astype(np.float32)[None] for axis in (0, 1))
+    levels = sample(scene.image, x, y)[0].astype(np.float64)
+    spread = middle(np.abs(levels - middle(levels)))
+    return spread > LIMITS.clipped * middle(course.contrast[course.good])
+
+
+def drawn(scene: Scene, courses: Sequence[Course]) -> set[int]:
+    """Return the lines that are drawn along rows or columns.
+
+    They have less noise than the ground; or there are several, from end to end on the image or
+    from border to border: no two fibres come to lie like that.
+    """
+    even, whole = set(), set()
+    for index, course in enumerate(courses):
+        aside, length = np.sort(np.ptp(course.line, axis=0)).tolist()
+        if aside <= LIMITS.aslant_px and _is_even(scene, course):
+            even.add(index)
+        kinds = {end.kind for end in course.ends}
+        if aside <= max(LIMITS.several_aslant_px, LIMITS.several_aslant * length) and (
+            kinds in ({EndKind.FREE}, {EndKind.BORDER})
+        ):
+            whole.add(index)
+    several = even | whole
+    return several if len(several) > 1 else even
+
+
+def _is_even(scene: Scene, course: Course) -> bool:
+    """Return whether a line has less noise than the ground."""
     x, y = (course.line[:, axis].astype(np.float32)[None] for axis in (0, 1))
     levels = sample(scene.image, x, y)[0].astype(np.float64)
     inner = levels[len(levels) // 8 : len(levels) - len(levels) // 8]

@@ -7,7 +7,15 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.frame.errors import NotAvailable
-from cosmic.vico.core.vision import axial, certainty, checks, picture_edge
+from cosmic.vico.core.vision import (
+    axial,
+    beyond,
+    certainty,
+    checks,
+    copies,
+    fragments,
+    picture_edge,
+)
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
@@ -41,6 +49,8 @@ LEAST_PX = 12.0
 LEAST_OF_IMAGE = 0.025
 # Lighter inside, it is ground between two fibres and no hollow.
 MOST_HOLLOW = 0.8
+# Of the blur of its edges, by which a fibre on a clipped ground is too short.
+CLIPPED_BLURS = 1.5
 # More cannot be told apart in time, nor in a network at all.
 MOST_STRANDS = 96
 
@@ -152,7 +162,8 @@ def fibre(
     widths *= width / float(widths.mean())
     kinks = kink_angles_deg(line, width)
     ends_std = np.array([end.std_px for end in course.ends])
-    length_std = length_deviation(course, length)
+    clipped = checks.is_clipped(scene, course)
+    length_std = length_deviation(course, length, clipped=clipped)
     if length_std > 0.01 * length:
         doubts.append(checks.IMPRECISE)
     whole = certainty.probability(signs, doubts)
@@ -190,12 +201,16 @@ def fibre(
     )
 
 
-def length_deviation(course: Course, length: float) -> float:
-    """Return the standard deviation of the length."""
+def length_deviation(course: Course, length: float, *, clipped: bool) -> float:
+    """Return the standard deviation of the length.
+
+    Where the ground is clipped nobody sees where a half of the contrast would have been.
+    """
     ends = sum(end.std_px**2 for end in course.ends)
     hidden = float((~course.good).sum()) * 2.0
     dirt = 2.0 * max(0.0, checks.uneven_ends(course) - 1.0)
-    return float(np.sqrt(ends + (2e-4 * length) ** 2 + (0.004 * hidden) ** 2 + dirt**2))
+    edges = CLIPPED_BLURS * course.edge_blur_px if clipped else 0.0
+    return float(np.sqrt(ends + (2e-4 * length) ** 2 + (0.004 * hidden) ** 2 + dirt**2 + edges**2))
 
 
 def width_deviation(course: Course, section: Section) -> float:
@@ -263,36 +278,44 @@ def checked_fibres(
     scene: Scene, courses: list[tuple[Strand, Course]], *, crowd: bool
 ) -> list[Fibre]:
     """Return the fibres, the longest first, with what is doubtful about them together."""
-    lines = [course.line for _, course in courses]
-    widths = [course.width for _, course in courses]
-    apart = checks.continued([course for _, course in courses])
+    measured = [course for _, course in courses]
+    lines = [course.line for course in measured]
+    widths = [course.width for course in measured]
     explained = explained_by(scene, lines, widths)
-    beside = left_over(scene, lines, widths, explained)
-    sections = pooled([section_of(scene, course) for _, course in courses])
+    together = (
+        (checks.drawn(scene, measured), checks.DRAWN),
+        (copies.copied(measured), copies.COPY),
+        (set(range(len(courses))) if crowd else set(), checks.CROWDED),
+        (
+            checks.continued(measured) | fragments.broken_off(scene, measured, explained),
+            checks.CONTINUES,
+        ),
+        (left_over(scene, lines, widths, explained), checks.LEFT_OVER),
+    )
+    sections = pooled([section_of(scene, course) for course in measured])
     found = []
     for index, (strand, course) in enumerate(courses):
         signs = certainty.signs_of(scene, course, explained)
         doubts = [*strand.doubts, *checks.doubts_of(course, scene.step), *signs.doubts]
-        if not signs.joints.checked:
-            doubts.append(axial.UNCHECKED)
-        if sections[index].hollow > MOST_HOLLOW:
-            doubts.append(checks.PARTED)
-        if touches_border(scene, course):
-            doubts.append(EndKind.BORDER.value)
-        if picture_edge.is_cut(
-            scene, course, explained, compressed=signs.compressed > certainty.NOISE
-        ):
-            doubts.append(picture_edge.CUT)
-        if checks.is_drawn(scene, course):
-            doubts.append(checks.DRAWN)
-        if crowd:
-            doubts.append(checks.CROWDED)
-        if index in apart:
-            doubts.append(checks.CONTINUES)
-        if index in beside:
-            doubts.append(checks.LEFT_OVER)
+        doubts += doubts_by_itself(scene, course, sections[index], signs, explained)
+        doubts += [reason for which, reason in together if index in which]
         found.append(fibre(scene, course, sections[index], doubts, signs))
     return sorted(found, key=lambda each: -each.length_px)
+
+
+def doubts_by_itself(
+    scene: Scene, course: Course, section: Section, signs: certainty.Signs, explained: Mask
+) -> list[str]:
+    """Return what is doubtful about a fibre where it lies on the image."""
+    compressed = signs.compressed > certainty.NOISE
+    reasons = (
+        (not signs.joints.checked, axial.UNCHECKED),
+        (section.hollow > MOST_HOLLOW, checks.PARTED),
+        (touches_border(scene, course), EndKind.BORDER.value),
+        (picture_edge.is_cut(scene, course, explained, compressed=compressed), picture_edge.CUT),
+        (beyond.is_covered(scene, course), beyond.COVERED),
+    )
+    return [reason for doubtful, reason in reasons if doubtful]
 
 
 def touches_border(scene: Scene, course: Course) -> bool:

@@ -65,6 +65,9 @@ def bending(first: Exit, last: Exit) -> float:
 
 # Bending, in squared radians, that is worse than two loose ends in a crossing.
 LOOSE = 0.7
+# Radians, as `bending`. Where one ends on another, or a short end of a crossing is not seen, the
+# second best way is as good up to this.
+ODD = 0.6
 # Two fibres that cross at a small angle lie on each other over so many widths.
 LONGEST_BRIDGE = 14.0
 EASY = 0.5
@@ -265,7 +268,8 @@ def pair(graph: Graph, joint: Joint, half_width: list[float]) -> None:
         joint.partner[joint.stubs[j]] = joint.stubs[i]
     base = LOOSE * (count % 2)
     worth, next_worth = (float(np.sqrt(max(0.0, prices[k] - base))) for k in order[:2])
-    unclear = next_worth < 1.6 * worth + 0.1 or ends_meet(graph, joint, half_width)
+    least = ODD if count % 2 else 0.0
+    unclear = next_worth < max(1.6 * worth + 0.1, least) or ends_meet(graph, joint, half_width)
     note_doubt(joint, costs, best, unclear)
 
 

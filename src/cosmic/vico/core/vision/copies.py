@@ -1,0 +1,55 @@
+"""What is on an image twice: a reflection, or the marks of a frame."""
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from cosmic.vico.core.vision.grey import Floats, middle
+from cosmic.vico.core.vision.refine import Course
+from cosmic.vico.core.vision.smoothing import arc_lengths
+
+COPY: Final = "another one has the same shape: it may be a reflection, or a mark that was drawn"
+
+POINTS: Final = 9
+"""At which courses are compared."""
+ALIKE_PX: Final = 1.5
+WEAKER: Final = 0.75
+"""Of the contrast of another one: then it is the copy."""
+QUARTER: Final = np.array([[0.0, 1.0], [-1.0, 0.0]])
+
+
+def copied(courses: Sequence[Course]) -> set[int]:
+    """Return the fibres of which another one is a copy: moved and stronger, or turned by a quarter.
+
+    Fibres as strong as each other may lie side by side alike, as cut and combed; not across.
+    """
+    shapes = [_shape(course.line) for course in courses]
+    contrasts = [middle(each.contrast[each.good]) if each.good.any() else 0.0 for each in courses]
+    found: set[int] = set()
+    for i, j in combinations(range(len(courses)), 2):
+        if _same(shapes[i], shapes[j] @ QUARTER):
+            found |= {i, j}
+        elif _same(shapes[i], shapes[j]):
+            if contrasts[i] < WEAKER * contrasts[j]:
+                found.add(i)
+            elif contrasts[j] < WEAKER * contrasts[i]:
+                found.add(j)
+    return found
+
+
+def _shape(line: Floats) -> Floats:
+    """Return points evenly along a line, around their middle."""
+    s = arc_lengths(line)
+    at = np.linspace(0.0, float(s[-1]), POINTS)
+    points = np.column_stack([np.interp(at, s, line[:, axis]) for axis in (0, 1)])
+    return np.asarray(points - points.mean(axis=0))
+
+
+def _same(one: Floats, other: Floats) -> bool:
+    """Return whether two are alike as they are, or turned by half."""
+    return any(
+        float(np.linalg.norm(one - there, axis=1).max()) < ALIKE_PX
+        for there in (other, other[::-1], -other, -other[::-1])
+    )

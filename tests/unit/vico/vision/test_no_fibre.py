@@ -1,0 +1,68 @@
+"""What looks like a fibre and is none: a scratch, the marks of a frame."""
+
+import cv2
+import numpy as np
+import pytest
+
+from cosmic.vico.core.vision.checks import DRAWN, EMBOSSED
+from cosmic.vico.core.vision.copies import COPY
+from cosmic.vico.core.vision.finding import find_fibres
+from unit.vico.vision.drawn_fibres import arc, drawn_image, strip
+
+SHAPE = (480, 640)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_scratch_dark_on_one_side_and_light_on_the_other_is_not_certain(side: float) -> None:
+    line = arc((100.0, 150.0), 0.3, 300.0, 0.02)
+    tangent = np.gradient(line, axis=0)
+    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+    normal *= side / np.linalg.norm(normal, axis=1, keepdims=True)
+    dark, light = (strip(SHAPE, line + away * normal, 4.0) for away in (-2.0, 2.0))
+    image = cv2.GaussianBlur(150.0 - 50.0 * dark + 50.0 * light, (0, 0), 1.0)
+    image += np.random.default_rng(2).normal(0.0, 3.0, SHAPE)
+    for fibre in find_fibres(np.clip(np.round(image), 0, 255).astype(np.uint8)):
+        assert not fibre.certain
+        assert EMBOSSED in fibre.doubts
+
+
+def test_a_fibre_on_a_sharpened_image_is_certain() -> None:
+    line = arc((120.0, 120.0), 0.5, 320.0, 0.5)
+    image = drawn_image([line], [9.0]).astype(np.float32)
+    seam = image + 1.0 * (image - cv2.GaussianBlur(image, (0, 0), 2.0))
+    (found,) = find_fibres(np.clip(np.round(seam), 0, 255).astype(np.uint8))
+    assert found.certain
+
+
+def test_several_lines_along_rows_and_columns_are_drawn() -> None:
+    down = np.column_stack([np.full(400, 120.0), np.linspace(100.0, 200.0, 400)])
+    along = np.column_stack([np.linspace(300.0, 420.0, 400), np.full(400, 380.0)])
+    fibre = arc((250.0, 120.0), 0.4, 200.0, 0.5)
+    found = find_fibres(drawn_image([down, along, fibre], [7.0, 7.0, 9.0]))
+    assert [round(each.length_px) for each in found if each.certain] == [200]
+    assert sum(DRAWN in each.doubts for each in found) == 2
+
+
+def test_the_weaker_of_two_that_are_alike_is_a_reflection() -> None:
+    line = arc((120.0, 120.0), 0.5, 320.0, 0.5)
+    image = drawn_image([line], [9.0], noise=2.0).astype(np.float32)
+    ghost = 0.75 * image + 0.25 * np.roll(image, (-70, 40), axis=(0, 1))
+    found = find_fibres(np.round(ghost).astype(np.uint8))
+    assert [each.certain for each in sorted(found, key=lambda each: -each.contrast)] == [
+        True,
+        False,
+    ]
+    assert COPY in min(found, key=lambda each: each.contrast).doubts
+
+
+def test_marks_of_a_frame_that_is_turned_are_copies() -> None:
+    centre, half = np.array([320.0, 240.0]), 45.0
+    lines = []
+    for number in range(4):
+        angle = 0.12 + 0.5 * np.pi * number
+        out = np.array([np.cos(angle), np.sin(angle)])
+        along = np.array([-out[1], out[0]])
+        lines.append(centre + 180.0 * out + np.linspace(-half, half, 400)[:, None] * along)
+    found = find_fibres(drawn_image(lines, [7.0] * 4))
+    assert len(found) == 4
+    assert all(COPY in each.doubts for each in found)
