@@ -203,3 +203,31 @@ def test_a_click_takes_the_note_away_and_leaves_the_refusal(
     qtbot.mouseClick(bubble(field), Qt.MouseButton.LeftButton)
     assert not bubble(field).isVisible()
     assert field.reason
+
+
+def test_what_is_typed_after_the_click_into_a_field_replaces_its_number(
+    qtbot: QtBot, window: QWidget
+) -> None:
+    fields(window)[1].setFocus()
+    field = fields(window)[0]
+    qtbot.mouseClick(field, Qt.MouseButton.LeftButton)
+    qtbot.keyClicks(field, "0.2 mm")
+    qtbot.keyClick(field, Qt.Key.Key_Return)
+    assert field.value() == 200.0
+
+
+def test_a_click_into_a_field_that_is_typed_into_puts_the_cursor(
+    qtbot: QtBot, field: QuantityField
+) -> None:
+    field.setText("120")
+    qtbot.mouseClick(field, Qt.MouseButton.LeftButton)
+    assert not field.hasSelectedText()
+
+
+def test_a_double_click_marks_the_whole_number(qtbot: QtBot, field: QuantityField) -> None:
+    field.set_value(-12.5)
+    room = field.cursorRect().center()
+    qtbot.mouseDClick(field, Qt.MouseButton.LeftButton, pos=room)
+    qtbot.keyClicks(field, "90")
+    qtbot.keyClick(field, Qt.Key.Key_Return)
+    assert field.value() == 90.0

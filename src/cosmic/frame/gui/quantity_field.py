@@ -3,7 +3,15 @@
 from typing import Final
 
 from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QEnterEvent, QFocusEvent, QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtGui import (
+    QColor,
+    QEnterEvent,
+    QFocusEvent,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+)
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QWidget
 
 from cosmic.frame.errors import QuantityError
@@ -28,7 +36,8 @@ class QuantityField(QLineEdit):
 
     A bad entry is refused, never clamped: it keeps its text, the border turns, the reason stands
     below the field, in the tooltip and in the accessible description. Escape goes back to the
-    last good value.
+    last good value. The click that enters it marks the whole number, so that what is typed
+    replaces it; the next click puts the cursor.
 
     Parameters
     ----------
@@ -71,6 +80,7 @@ class QuantityField(QLineEdit):
         self._name = name
         self._good = value
         self._before_commit: float | None = None
+        self._clicked_into = False
         self._reason = ""
         self._shown = self._text_of(value)
         self.setText(self._shown)
@@ -243,7 +253,20 @@ class QuantityField(QLineEdit):
     @override
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
+        self._clicked_into = event.reason() == Qt.FocusReason.MouseFocusReason
         self._show_reason_again()
+
+    @override
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        super().mouseReleaseEvent(event)
+        if self._clicked_into and not self.hasSelectedText():
+            self.selectAll()
+        self._clicked_into = False
+
+    @override
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        self.selectAll()  # Qt takes the digits on one side of the point alone
+        event.accept()
 
     @override
     def enterEvent(self, event: QEnterEvent) -> None:
