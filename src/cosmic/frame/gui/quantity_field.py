@@ -146,6 +146,10 @@ class QuantityField(QLineEdit):
         self._set_reason(reason)
         self.refused.emit(reason)
 
+    def end_refusal(self) -> None:
+        """Take the refusal away, as it holds no longer; what was typed stays."""
+        self._set_reason("")
+
     def revert(self) -> None:
         """Go back to the last good value."""
         self._set_reason("")
