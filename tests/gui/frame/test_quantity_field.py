@@ -1,10 +1,12 @@
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.reason_bubble import ReasonBubble
+from cosmic.frame.gui.theme import current_palette
 
 
 @pytest.fixture
@@ -231,3 +233,26 @@ def test_a_double_click_marks_the_whole_number(qtbot: QtBot, field: QuantityFiel
     qtbot.keyClicks(field, "90")
     qtbot.keyClick(field, Qt.Key.Key_Return)
     assert field.value() == 90.0
+
+
+def test_the_mark_of_a_refusal_covers_no_digit(qtbot: QtBot, field: QuantityField) -> None:
+    field.setText("-9000.0")
+    field.setFixedWidth(80)  # as in the table of axes
+    before = field.grab().toImage()
+    field.refuse("too far")
+    field.deselect()
+    after = field.grab().toImage()
+    mark = QColor(current_palette().refused)
+    marked = [
+        x
+        for x in range(4, after.width() - 4)
+        for y in range(8, after.height() - 8)
+        if _near(after.pixelColor(x, y), mark) and not _near(before.pixelColor(x, y), mark)
+    ]
+    assert marked
+    assert min(marked) > field.cursorRect().left()
+
+
+def _near(one: QColor, other: QColor) -> bool:
+    pairs = zip(one.getRgb(), other.getRgb(), strict=True)
+    return all(abs(a - b) < 40 for a, b in pairs)

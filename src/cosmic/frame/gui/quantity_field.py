@@ -9,7 +9,6 @@ from PySide6.QtGui import (
     QFocusEvent,
     QKeyEvent,
     QMouseEvent,
-    QPainter,
     QPaintEvent,
 )
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QWidget
@@ -292,16 +291,20 @@ class QuantityField(QLineEdit):
         super().paintEvent(event)
         with painting(self) as painter:
             palette = current_palette()
-            painter.setPen(QColor(palette.dim if self.isEnabled() else palette.disabled))
-            room: QRect = self.rect().adjusted(0, 0, -STEP_PX, 0)
-            align = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-            painter.drawText(room, int(align), DISPLAY[self._unit])
-            if self._reason:
-                self._paint_mark(painter)
+            room: QRect = self.rect().adjusted(STEP_PX, 0, -STEP_PX, 0)
+            right = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            left = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+            beside = not self._reason or self._has_room_for_mark(room.width())
+            if beside:
+                painter.setPen(QColor(palette.dim if self.isEnabled() else palette.disabled))
+                painter.drawText(room, right, DISPLAY[self._unit])
+            if self._reason:  # the shape of REFUSED: colour alone would not do
+                painter.setPen(QColor(palette.refused))
+                painter.drawText(room, left if beside else right, state_look(State.REFUSED).glyph)
 
-    def _paint_mark(self, painter: QPainter) -> None:
-        """Draw the shape of REFUSED at the left: colour alone would not do."""
-        painter.setPen(QColor(current_palette().refused))
-        room = self.rect().adjusted(STEP_PX, 0, 0, 0)
-        align = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(room, int(align), state_look(State.REFUSED).glyph)
+    def _has_room_for_mark(self, room_px: int) -> bool:
+        """Tell whether the mark fits beside number and unit; else it has the place of the unit."""
+        metrics = self.fontMetrics()
+        mark_px = metrics.horizontalAdvance(state_look(State.REFUSED).glyph)
+        text_px = metrics.horizontalAdvance(self.text()) + self._unit_width_px()
+        return text_px + mark_px + STEP_PX // 2 <= room_px
