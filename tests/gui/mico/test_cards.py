@@ -201,7 +201,7 @@ def test_the_next_good_command_takes_the_refusal_away(panel: MicoWidget, qtbot: 
     qtbot.waitUntil(lambda: part(card, "status", QLabel).text() == "±5500 µm travel")
 
 
-def test_a_refusal_is_told_until_the_axis_moves_by_anything(
+def test_a_refusal_is_shown_until_the_axis_moves_by_anything(
     panel: MicoWidget, qtbot: QtBot
 ) -> None:
     card = panel.cards["left.x"]
