@@ -3,6 +3,9 @@
 from typing import TYPE_CHECKING, cast
 
 import pytest
+from PySide6.QtCore import QEvent, QPointF, Qt
+from PySide6.QtGui import QMouseEvent
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.operation_card import OperationCard, at_work
@@ -31,6 +34,11 @@ class Run:
     state = RunState.RUNNING
     tree = NodeView(NodeEvent((), "bend test", OPERATION, NodeState.WAITING), 1.0)
 
+    aborted = ""
+
+    def abort(self, why: str) -> None:
+        self.aborted = why
+
     def work_at(self, name: str) -> None:
         self.tree = NodeView(NodeEvent((), name, OPERATION, NodeState.RUNNING), 1.0)
 
@@ -55,3 +63,18 @@ def test_a_running_card_is_as_high_as_what_it_says_and_can_be_ended(qtbot: QtBot
 def test_the_card_writes_micronewtons_as_they_are_read(name: str, read: str) -> None:
     event = NodeEvent((), name, OPERATION, NodeState.RUNNING)
     assert at_work(NodeView(event, 1.0)) == read
+
+
+def test_the_second_click_of_a_double_click_ends_nothing(qtbot: QtBot) -> None:
+    run = Run()
+    card = OperationCard(50.0)
+    qtbot.addWidget(card)
+    card.follow("Undo", cast("ProcedureRun[HandlingContext]", run))
+    # The first was on the button that End has taken the place of.
+    for kind in (QEvent.Type.MouseButtonDblClick, QEvent.Type.MouseButtonRelease):
+        place = QPointF(card.stop.rect().center())
+        button, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+        QApplication.sendEvent(card.stop, QMouseEvent(kind, place, place, button, button, none))
+    assert not run.aborted
+    qtbot.mouseClick(card.stop, Qt.MouseButton.LeftButton)
+    assert run.aborted

@@ -99,6 +99,19 @@ def test_only_what_makes_sense_can_be_pressed(panel: ProcedureTreePanel) -> None
     assert set(RULES) == set(RunState)
 
 
+def test_space_after_pause_aborts_nothing(panel: ProcedureTreePanel, qtbot: QtBot) -> None:
+    work = Work()
+    run = Still(Procedure("trial", Op("a")), work, work.clock, FailurePolicy())
+    run.at = RunState.RUNNING
+    panel.follow(run)
+    panel.activateWindow()
+    qtbot.waitUntil(panel.isActiveWindow)
+    panel.pause.setFocus()
+    for run.at in (RunState.PAUSING, RunState.PAUSED):
+        panel.refresh()
+        assert QApplication.focusWidget() is panel
+
+
 def test_without_a_procedure_nothing_can_be_pressed(qtbot: QtBot) -> None:
     panel = shown(qtbot, ProcedureTreePanel())
     assert enabled(panel) == set()

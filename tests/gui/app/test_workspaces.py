@@ -743,3 +743,42 @@ def test_a_refused_move_offers_how_far_it_may_go(whole: OperatorWindow, qtbot: Q
     wanted = float(tool.nearest.text().removeprefix("Go to "))
     qtbot.mouseClick(tool.nearest, LEFT)
     qtbot.waitUntil(lambda: abs(position(card) - wanted) < 2.0)
+
+
+def test_what_a_refusal_offered_is_gone_when_the_axis_was_moved(
+    whole: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(whole, qtbot, HANDLE)
+    tool = tasks(whole).tool
+    card = mico(whole).cards["left.z"]
+    qtbot.waitUntil(lambda: card.axis.details.present)
+    qtbot.mouseClick(tool.choices["left"], LEFT)
+    tool.step.setText("4000")
+    qtbot.mouseClick(tool.pad["z", -1], LEFT)
+    qtbot.waitUntil(tool.nearest.isVisible)
+    card.axis.move_by(300.0, wait=False)
+    qtbot.waitUntil(lambda: not tool.nearest.isVisible())
+    assert tool.line.text() == ""
+    qtbot.waitUntil(lambda: not card.axis.details.in_motion)
+
+
+def test_the_table_of_axes_shows_a_target_with_its_sign(
+    whole: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(whole, qtbot, SET_UP)
+    target = next(e for e in whole.findChildren(QLineEdit, "rowTarget") if e.isVisible())
+    before, width_px = target.text(), target.width()
+    target.setText("-5500.0")
+    shown = ink(target)
+    target.setFixedWidth(2 * width_px)
+    wanted = ink(target)
+    target.setFixedWidth(width_px)
+    target.setText(before)
+    assert shown == wanted
+
+
+def ink(field: QLineEdit) -> int:
+    """Return how many pixels inside a field are written on."""
+    image = field.grab(field.rect().adjusted(4, 4, -4, -4)).toImage()
+    rows, columns = range(image.height()), range(image.width())
+    return sum(image.pixelColor(x, y).lightness() > 110 for x in columns for y in rows)

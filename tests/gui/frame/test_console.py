@@ -4,13 +4,14 @@ from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QPushButton
+from PySide6.QtWidgets import QApplication, QMainWindow, QPushButton
 from pytestqt.qtbot import QtBot
 
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import Failure, FailurePolicy
 from cosmic.frame.gui.console_input import ConsoleInput
 from cosmic.frame.gui.console_panel import ConsolePanel
+from cosmic.frame.gui.drawer import Drawer
 from cosmic.frame.hooks import install_hooks
 
 SHORT_MS = 5000
@@ -245,3 +246,23 @@ def test_what_cannot_be_broken_is_left_behind_in_time(
     assert sys.stdout is before
     gate.set()
     assert panel.shut_down()
+
+
+def test_a_line_typed_after_the_drawer_opened_the_console_goes_into_it(
+    console: ConsolePanel, qtbot: QtBot
+) -> None:
+    window = QMainWindow()
+    drawer = Drawer(window)
+    window.statusBar().addWidget(drawer)
+    drawer.add_page("Console", console, "")
+    qtbot.addWidget(window)
+    with qtbot.waitActive(window):
+        window.show()
+        window.activateWindow()
+    window.setFocus()
+    qtbot.mouseClick(drawer.button("Console"), Qt.MouseButton.LeftButton)
+    qtbot.keyClicks(QApplication.focusWidget(), "print('dear reader')")
+    qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: "\ndear reader" in console.text())
+    drawer.close_page()
+    assert QApplication.focusWidget() is window

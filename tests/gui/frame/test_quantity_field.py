@@ -1,10 +1,12 @@
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.reason_bubble import ReasonBubble
+from cosmic.frame.gui.theme import current_palette
 
 
 @pytest.fixture
@@ -203,3 +205,54 @@ def test_a_click_takes_the_note_away_and_leaves_the_refusal(
     qtbot.mouseClick(bubble(field), Qt.MouseButton.LeftButton)
     assert not bubble(field).isVisible()
     assert field.reason
+
+
+def test_what_is_typed_after_the_click_into_a_field_replaces_its_number(
+    qtbot: QtBot, window: QWidget
+) -> None:
+    fields(window)[1].setFocus()
+    field = fields(window)[0]
+    qtbot.mouseClick(field, Qt.MouseButton.LeftButton)
+    qtbot.keyClicks(field, "0.2 mm")
+    qtbot.keyClick(field, Qt.Key.Key_Return)
+    assert field.value() == 200.0
+
+
+def test_a_click_into_a_field_that_is_typed_into_puts_the_cursor(
+    qtbot: QtBot, field: QuantityField
+) -> None:
+    field.setText("120")
+    qtbot.mouseClick(field, Qt.MouseButton.LeftButton)
+    assert not field.hasSelectedText()
+
+
+def test_a_double_click_marks_the_whole_number(qtbot: QtBot, field: QuantityField) -> None:
+    field.set_value(-12.5)
+    room = field.cursorRect().center()
+    qtbot.mouseDClick(field, Qt.MouseButton.LeftButton, pos=room)
+    qtbot.keyClicks(field, "90")
+    qtbot.keyClick(field, Qt.Key.Key_Return)
+    assert field.value() == 90.0
+
+
+def test_the_mark_of_a_refusal_covers_no_digit(qtbot: QtBot, field: QuantityField) -> None:
+    field.setText("-9000.0")
+    field.setFixedWidth(80)  # as in the table of axes
+    before = field.grab().toImage()
+    field.refuse("too far")
+    field.deselect()
+    after = field.grab().toImage()
+    mark = QColor(current_palette().refused)
+    marked = [
+        x
+        for x in range(4, after.width() - 4)
+        for y in range(8, after.height() - 8)
+        if _near(after.pixelColor(x, y), mark) and not _near(before.pixelColor(x, y), mark)
+    ]
+    assert marked
+    assert min(marked) > field.cursorRect().left()
+
+
+def _near(one: QColor, other: QColor) -> bool:
+    pairs = zip(one.getRgb(), other.getRgb(), strict=True)
+    return all(abs(a - b) < 40 for a, b in pairs)

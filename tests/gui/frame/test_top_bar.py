@@ -108,6 +108,14 @@ def test_a_narrow_bar_says_stopped_in_whole(bar: TopBar) -> None:
     assert "force above 400 µN" in label.toolTip()
 
 
+def test_a_reason_too_long_for_the_large_letters_stands_in_small_ones(bar: TopBar) -> None:
+    words = "■ STOPPED: force reached 153.5 µN, its limit is 150"
+    bar.set_latched("force reached 153.5 uN, its limit is 150")
+    label = next(each for each in bar.findChildren(ElidedLabel) if "STOPPED" in each.text())
+    label.resize(int(0.9 * label.fontMetrics().horizontalAdvance(words)), label.height())
+    assert label.shown_text == words
+
+
 def test_missing_collision_model_is_said_loudly(bar: TopBar) -> None:
     assert "no collision model" in texts(bar)
     bar.set_collision_model(present=True)

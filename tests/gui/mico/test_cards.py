@@ -201,6 +201,32 @@ def test_the_next_good_command_takes_the_refusal_away(panel: MicoWidget, qtbot: 
     qtbot.waitUntil(lambda: part(card, "status", QLabel).text() == "±5500 µm travel")
 
 
+def test_a_refusal_is_shown_until_the_axis_moves_by_anything(
+    panel: MicoWidget, qtbot: QtBot
+) -> None:
+    card = panel.cards["left.x"]
+    entry = field(card, "target")
+    enter(qtbot, entry, "9 mm")
+    click(qtbot, card, "MiCoCL_9")
+    qtbot.waitUntil(lambda: bool(entry.reason))
+    panel.mico["left.x"].move_to(500.0, wait=False)
+    qtbot.waitUntil(lambda: part(card, "status", QLabel).text() == "±5500 µm travel")
+    assert not entry.reason
+    assert entry.text() == "9000.0"
+
+
+def test_a_refusal_by_the_stop_ends_with_the_reset(panel: MicoWidget, qtbot: QtBot) -> None:
+    card = panel.cards["left.x"]
+    entry = field(card, "target")
+    panel.mico.stop("the test")
+    panel.show_stopped("the test")
+    enter(qtbot, entry, "10")
+    click(qtbot, card, "MiCoCL_9")
+    qtbot.waitUntil(lambda: "reset the stop" in entry.reason)
+    panel.show_stopped(None)
+    assert not entry.reason
+
+
 def test_the_badge_says_busy_while_it_moves_and_stop_ends_only_that_axis(qtbot: QtBot) -> None:
     with simulated_panel(qtbot, rate=2.0) as panel:
         moving, other = panel.cards["left.x"], panel.cards["right.x"]

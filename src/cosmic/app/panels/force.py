@@ -41,7 +41,7 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.file_names import NameOption
 from cosmic.frame.gui.amounts import clock_text
-from cosmic.frame.gui.build import named, push_button, styled, tight_row, tipped
+from cosmic.frame.gui.build import click_once, named, push_button, styled, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
@@ -162,6 +162,7 @@ class ForcePanel(QWidget):
         self.note.setPlaceholderText("note")
         self.record = named(push_button("● Record", ""), "recordForce")
         self.record.setCheckable(True)
+        click_once(self.record)
         self.record.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.record.clicked.connect(self._on_record)
         self.tare = styled(named(push_button("Tare", "Call the force now zero"), "tare"), "narrow")

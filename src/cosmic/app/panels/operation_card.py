@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 from cosmic.autonomy.procedures.run import OVER, ProcedureRun, RunState
 from cosmic.autonomy.procedures.tree import ENDS, OPERATION, RUNNING_STATES, NodeView
 from cosmic.daqco.gui.value_field import ValueField
-from cosmic.frame.gui.build import named, push_button, styled, tight_row
+from cosmic.frame.gui.build import click_once, named, push_button, styled, tight_row
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.key_focus import set_shown
 from cosmic.frame.gui.state_badge import StateBadge
@@ -87,6 +87,7 @@ class OperationCard(QFrame):
             push_button("End", "End it: moves are cancelled, then the tools are made safe"),
             "operationStop",
         )
+        click_once(self.stop)
         self.close_button = styled(push_button("✕", "Close this card"), "narrow")
         self.next = named(push_button("", ""), "operationNext")
         self.undo = named(push_button("Undo", ""), "operationUndo")

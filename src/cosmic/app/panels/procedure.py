@@ -17,6 +17,7 @@ from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
+from cosmic.frame.gui.key_focus import set_usable
 from cosmic.frame.gui.theme import STEP_PX, State
 from cosmic.frame.overrides import override
 
@@ -329,12 +330,15 @@ class ProcedureTreePanel(QWidget):
         fresh = state is RunState.READY or (
             self._make_run is not None and (state is None or state in OVER)
         )
-        self.start.setEnabled(fresh)
-        self.pause.setEnabled(state is RunState.RUNNING)
-        self.step.setEnabled(fresh or state is RunState.PAUSED)
         early = self._go_on is not None and state in (RunState.ABORTED, RunState.FAILED)
-        self.resume.setEnabled(early or state in (RunState.PAUSED, RunState.PAUSING))
-        self.abort.setEnabled(state in _BEGUN)
+        for button, usable in (
+            (self.start, fresh),
+            (self.pause, state is RunState.RUNNING),
+            (self.step, fresh or state is RunState.PAUSED),
+            (self.resume, early or state in (RunState.PAUSED, RunState.PAUSING)),
+            (self.abort, state in _BEGUN),
+        ):
+            set_usable(button, self, usable=usable)
 
     @override
     def showEvent(self, event: QShowEvent) -> None:

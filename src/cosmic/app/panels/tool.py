@@ -159,6 +159,7 @@ class ToolPanel(QWidget):
         self._arrange()
         self._gui.refreshed.connect(self._on_refreshed)
         self._gui.verdict_given.connect(self._on_refused)
+        self._gui.refusal_over.connect(self._on_refusal_over)
         self._gui.undoing.available.connect(self._on_undo_available)
         self._gui.undoing.said.connect(self._on_said)
         self._gui.undoing.show_available()
@@ -545,6 +546,7 @@ class ToolPanel(QWidget):
 
     def say(self, text: str) -> None:
         """Say one line below the tool; what a refusal offered is gone. Empty takes it away."""
+        self._verdict = None
         shown = with_micro_signs(self._stopped or text)
         for button in (self.nearest, self.detour):
             button.hide()
@@ -566,6 +568,11 @@ class ToolPanel(QWidget):
         self.nearest.setVisible(reachable)
         again = self._last is not None and self._last[0] == verdict.axis
         self.detour.setVisible(again and verdict.reason is Reason.COLLISION)
+
+    def _on_refusal_over(self, name: str) -> None:
+        """Take away what was told of a refusal, and what it offered: the axis was moved since."""
+        if self._verdict is not None and self._verdict.axis == name:
+            self.say("")
 
     def _on_nearest(self) -> None:
         """Move as far as the refusal says that the axis may go, a little less."""

@@ -2,9 +2,13 @@
 
 from typing import TypeVar
 
+from PySide6.QtCore import QEvent, QObject
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QPushButton, QWidget
 
+from cosmic.frame.overrides import override
+
 W = TypeVar("W", bound=QWidget)
+B = TypeVar("B", bound=QAbstractButton)
 
 
 def named(widget: W, name: str) -> W:
@@ -51,6 +55,24 @@ def retip(widget: QWidget, tip: str) -> None:
 def push_button(text: str, tip: str) -> QPushButton:
     """Return a button that says what it does."""
     return tipped(QPushButton(text), tip)
+
+
+class _SecondClick(QObject):
+    """Takes the second press of a double click from a button."""
+
+    @override
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        return event.type() == QEvent.Type.MouseButtonDblClick
+
+
+def click_once(button: B) -> B:
+    """Have `button` take a double click for one click; returns it.
+
+    For what would end again what the first click began, on this button or on the one that it
+    has taken the place of.
+    """
+    button.installEventFilter(_SecondClick(button))
+    return button
 
 
 def tight_row(spacing_px: int) -> tuple[QWidget, QHBoxLayout]:

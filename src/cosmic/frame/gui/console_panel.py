@@ -70,6 +70,7 @@ class ConsolePanel(QWidget):
         self._input.submitted.connect(self.run)
         self._input.completion_requested.connect(self._on_completion_requested)
         self._input.interrupt_requested.connect(self.interrupt)
+        self.setFocusProxy(self._input)
         self._interrupt = push_button("Interrupt", "Interrupt the running code (Ctrl+C)")
         self._interrupt.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._interrupt.clicked.connect(self.interrupt)

@@ -26,6 +26,9 @@ _LEAST_PX: Final = 22 * STEP_PX
 class Drawer(QWidget):
     """One line of buttons; each opens its page over the picture, and never pushes it. GUI thread.
 
+    A page with a focus proxy is typed into there at once; else letters meant for it would be the
+    keys that jog axes. When it closes, the window has the focus.
+
     Parameters
     ----------
     window : QMainWindow
@@ -101,7 +104,13 @@ class Drawer(QWidget):
             self._lay_over()
             self._body.show()
             self._body.raise_()
+            entry = self._pages[title].focusProxy()
+            if entry is not None:
+                entry.setFocus()
         else:
+            focused = self._window.focusWidget()
+            if focused is not None and self._body.isAncestorOf(focused):
+                self._window.setFocus()  # Qt would give it to the next widget: Space presses it
             self._body.hide()
         self.opened.emit(title)
 

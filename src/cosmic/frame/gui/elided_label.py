@@ -1,7 +1,7 @@
 """A label for one line of any length: what does not fit is elided and stands in the tooltip."""
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetrics, QMouseEvent, QPaintEvent, QPalette
+from PySide6.QtGui import QColor, QFont, QFontMetrics, QMouseEvent, QPaintEvent, QPalette
 from PySide6.QtWidgets import QLabel, QSizePolicy, QStyle, QStyleOption, QWidget
 
 from cosmic.frame.gui.painting import painting
@@ -26,6 +26,7 @@ class ElidedLabel(QLabel):
         self._hint = hint
         self._whole: str | None = None
         self._shorter: tuple[str, ...] = ()
+        self._tight: QFont | None = None
         self._dim = False
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
@@ -55,6 +56,11 @@ class ElidedLabel(QLabel):
             self._dim = dim
             self.update()
 
+    def set_tight_font(self, font: QFont) -> None:
+        """Write the whole text in this smaller font before a shorter one is shown."""
+        self._tight = font
+        self.update()
+
     @override
     def sizeHint(self) -> QSize:
         return QSize(
@@ -73,7 +79,8 @@ class ElidedLabel(QLabel):
             style = self.style()
             style.drawPrimitive(QStyle.PrimitiveElement.PE_Widget, option, painter, self)
             room = self.contentsRect()
-            text = self._fitting(room.width())
+            text, font = self._fitting(room.width())
+            painter.setFont(font)
             if self._dim:
                 painter.setPen(QColor(current_palette().dim))
             style.drawItemText(
@@ -86,18 +93,23 @@ class ElidedLabel(QLabel):
                 QPalette.ColorRole.NoRole if self._dim else self.foregroundRole(),
             )
 
-    def _fitting(self, room_px: int) -> str:
-        """Return what is written into so much room."""
-        metrics = QFontMetrics(self.font())
+    def _fitting(self, room_px: int) -> tuple[str, QFont]:
+        """Return what is written into so much room, and in which font."""
+        usual = self.font()
         texts = (self.text(), *self._shorter)
-        fits = (each for each in texts if metrics.horizontalAdvance(each) <= room_px)
-        last = metrics.elidedText(texts[-1], Qt.TextElideMode.ElideRight, room_px)
-        return next(fits, last)
+        written = [(each, usual) for each in texts]
+        if self._tight is not None:
+            written.insert(1, (texts[0], self._tight))
+        for text, font in written:
+            if QFontMetrics(font).horizontalAdvance(text) <= room_px:
+                return text, font
+        elide = Qt.TextElideMode.ElideRight
+        return QFontMetrics(usual).elidedText(texts[-1], elide, room_px), usual
 
     @property
     def shown_text(self) -> str:
         """What is written in the room there is."""
-        return self._fitting(self.contentsRect().width())
+        return self._fitting(self.contentsRect().width())[0]
 
     @override
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:

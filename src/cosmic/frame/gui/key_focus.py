@@ -31,6 +31,16 @@ def set_shown(widget: QWidget, owner: QWidget, *, shown: bool) -> None:
     widget.setVisible(shown)
 
 
+def set_usable(widget: QWidget, owner: QWidget, *, usable: bool) -> None:
+    """Enable or disable a widget; what has the focus when it is disabled leaves it to `owner`.
+
+    Qt would give it to the next widget that can be used, and Space would press that.
+    """
+    if not usable and widget.hasFocus():
+        owner.setFocus()
+    widget.setEnabled(usable)
+
+
 def escape_is_for(widget: QWidget | None) -> bool:
     """Tell whether Escape has something to cancel that `widget`, with the focus, belongs to.
 

@@ -3,7 +3,14 @@
 from typing import Final
 
 from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QEnterEvent, QFocusEvent, QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtGui import (
+    QColor,
+    QEnterEvent,
+    QFocusEvent,
+    QKeyEvent,
+    QMouseEvent,
+    QPaintEvent,
+)
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QWidget
 
 from cosmic.frame.errors import QuantityError
@@ -28,7 +35,8 @@ class QuantityField(QLineEdit):
 
     A bad entry is refused, never clamped: it keeps its text, the border turns, the reason stands
     below the field, in the tooltip and in the accessible description. Escape goes back to the
-    last good value.
+    last good value. The click that enters it marks the whole number, so that what is typed
+    replaces it; the next click puts the cursor.
 
     Parameters
     ----------
@@ -71,6 +79,7 @@ class QuantityField(QLineEdit):
         self._name = name
         self._good = value
         self._before_commit: float | None = None
+        self._clicked_into = False
         self._reason = ""
         self._shown = self._text_of(value)
         self.setText(self._shown)
@@ -135,6 +144,10 @@ class QuantityField(QLineEdit):
             self._shown = self._text_of(self._good)
         self._set_reason(reason)
         self.refused.emit(reason)
+
+    def end_refusal(self) -> None:
+        """Take the refusal away, as it holds no longer; what was typed stays."""
+        self._set_reason("")
 
     def revert(self) -> None:
         """Go back to the last good value."""
@@ -243,7 +256,20 @@ class QuantityField(QLineEdit):
     @override
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
+        self._clicked_into = event.reason() == Qt.FocusReason.MouseFocusReason
         self._show_reason_again()
+
+    @override
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        super().mouseReleaseEvent(event)
+        if self._clicked_into and not self.hasSelectedText():
+            self.selectAll()
+        self._clicked_into = False
+
+    @override
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        self.selectAll()  # Qt takes the digits on one side of the point alone
+        event.accept()
 
     @override
     def enterEvent(self, event: QEnterEvent) -> None:
@@ -265,16 +291,20 @@ class QuantityField(QLineEdit):
         super().paintEvent(event)
         with painting(self) as painter:
             palette = current_palette()
-            painter.setPen(QColor(palette.dim if self.isEnabled() else palette.disabled))
-            room: QRect = self.rect().adjusted(0, 0, -STEP_PX, 0)
-            align = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-            painter.drawText(room, int(align), DISPLAY[self._unit])
-            if self._reason:
-                self._paint_mark(painter)
+            room: QRect = self.rect().adjusted(STEP_PX, 0, -STEP_PX, 0)
+            right = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            left = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+            beside = not self._reason or self._has_room_for_mark(room.width())
+            if beside:
+                painter.setPen(QColor(palette.dim if self.isEnabled() else palette.disabled))
+                painter.drawText(room, right, DISPLAY[self._unit])
+            if self._reason:  # the shape of REFUSED: colour alone would not do
+                painter.setPen(QColor(palette.refused))
+                painter.drawText(room, left if beside else right, state_look(State.REFUSED).glyph)
 
-    def _paint_mark(self, painter: QPainter) -> None:
-        """Draw the shape of REFUSED at the left: colour alone would not do."""
-        painter.setPen(QColor(current_palette().refused))
-        room = self.rect().adjusted(STEP_PX, 0, 0, 0)
-        align = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(room, int(align), state_look(State.REFUSED).glyph)
+    def _has_room_for_mark(self, room_px: int) -> bool:
+        """Tell whether the mark fits beside number and unit; else it has the place of the unit."""
+        metrics = self.fontMetrics()
+        mark_px = metrics.horizontalAdvance(state_look(State.REFUSED).glyph)
+        text_px = metrics.horizontalAdvance(self.text()) + self._unit_width_px()
+        return text_px + mark_px + STEP_PX // 2 <= room_px

@@ -237,6 +237,7 @@ class TopBar(QWidget):
         self._theme.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._latched_text = ElidedLabel()
         self._latched_text.setFont(ui_font(LARGE_PX, bold=True))
+        self._latched_text.set_tight_font(ui_font(bold=True))
         reset = push_button("Reset", "Allow movements again; nothing moves by itself")
         self._reset = named(reset, "resetButton")
         self._reset.setFont(ui_font(bold=True))

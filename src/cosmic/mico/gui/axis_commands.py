@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Final
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
@@ -11,8 +12,11 @@ from cosmic.frame.gui.relay import Relay
 from cosmic.frame.verdict import MoveVerdict, Reason
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.gui.detour_request import HINT, DetourRequest, Goal
 
+SEEN: Final = {"um": 1.0, "deg": 0.01}
+"""A change of position that is no noise."""
 Make = Callable[[bool], Movement | StepwiseMove]
 """Makes a movement; the argument is the operator's consent to an unknown position."""
 
@@ -59,6 +63,8 @@ class AxisCommands(QObject):
         It was refused, with the field it came from and the reason.
     verdict_given(MoveVerdict)
         The gate's own words to a refusal, also of a jog that stops in front of something.
+    refusal_over()
+        What was refused before holds no longer: the axis has moved since, or the stop was reset.
     ended(str)
         It ended; the text says why, and is empty at its target.
     consent_wanted(ConsentRequest)
@@ -72,6 +78,7 @@ class AxisCommands(QObject):
     begun = Signal()
     refused = Signal(object, str)
     verdict_given = Signal(object)
+    refusal_over = Signal()
     ended = Signal(str)
     consent_wanted = Signal(object)
     detour_wanted = Signal(object)
@@ -83,7 +90,8 @@ class AxisCommands(QObject):
         self._relay = Relay(self._on_ended)
         self._newest: _Command | None = None
         self._series: StepwiseMove | None = None
-        self._moved = False
+        self._moved = self._moving = False
+        self._rested_at: float | None = None
         self._blocked: _Command | None = None
         self.plans_detours = False
         """Have a detour planned where something stands in the way of a move to a goal."""
@@ -94,9 +102,17 @@ class AxisCommands(QObject):
         series = self._series
         return series if series is not None and not series.done else None
 
-    def note_motion(self) -> None:
-        """Say that the axis was seen moving: a stop then interrupts, and refuses nothing."""
-        self._moved = True
+    def note_state(self, state: PositionerState) -> None:
+        """Take what is seen of the axis: moving, a stop interrupts it and refuses nothing."""
+        here, before = state.position, self._rested_at
+        self._moved = self._moved or state.in_motion
+        begins = state.in_motion and not self._moving
+        # A short movement is over before it is seen.
+        away = here is not None and before is not None and abs(here - before) > SEEN[state.unit]
+        self._moving = state.in_motion
+        self._rested_at = None if state.in_motion else here
+        if begins or away:
+            self.refusal_over.emit()
 
     def issue(
         self, what: str, make: Make, field: QWidget | None = None, *, goal: Goal | None = None

@@ -29,7 +29,9 @@ from cosmic.mico.gui.positioner_gui import STATES, PositionerBaseGUI
 from cosmic.mico.hw.interface import PositionerKind
 
 _HEADS: Final = ("Axis", "State", "Position", "", "", "Step", "", "Target", "", "", "")
-_FIELD_PX: Final = 10 * STEP_PX
+_STEP_FIELD_PX: Final = 10 * STEP_PX
+_TARGET_PX: Final = 11 * STEP_PX
+"""Room for "-5500.0 µm": a sign that is out of sight makes another number of it."""
 _SIDE_PX: Final = 9 * STEP_PX
 
 
@@ -69,8 +71,8 @@ class AxisRow(QObject):
         tipped(self.stop, f"Stop {axis.key}; the other axes go on")
         self.line = named(ElidedLabel(), "rowLine")
         self.line.set_dim(True)
-        for field in (self.step, self.target):
-            field.setFixedWidth(_FIELD_PX)
+        self.step.setFixedWidth(_STEP_FIELD_PX)
+        self.target.setFixedWidth(_TARGET_PX)
         self.target.entered.connect(self._on_go_to)
         self.go_to.clicked.connect(self._on_go_to)
         self.stop.clicked.connect(card.halt)
@@ -231,4 +233,6 @@ def _shorter(text: str) -> tuple[str, ...]:
     if text.endswith(" travel"):
         span = text.removesuffix(" travel")
         return span, span.split(" ")[0]
+    if text.startswith("■ STOPPED"):
+        return "■ STOPPED", "STOPPED"
     return ("no sensor",) if text.startswith("no sensor") else ()

@@ -1,6 +1,7 @@
 """`MicoWidget`: the MiCo panel, all positioners in their groups (thesis 6.1.4)."""
 
 import logging
+from functools import partial
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
@@ -86,6 +87,8 @@ class MicoWidget(QWidget):
         There may be other devices now.
     verdict_given(MoveVerdict)
         A command of this panel was refused, or a jog stopped in front of something.
+    refusal_over(str)
+        What was refused for that axis holds no longer: it has moved since.
     undo_planned(object)
         The poses that Undo leads through, while it is asked about or under way; None afterwards.
     detour_requested(DetourRequest)
@@ -96,6 +99,7 @@ class MicoWidget(QWidget):
     failure_changed = Signal(str)
     refreshed = Signal()
     verdict_given = Signal(object)
+    refusal_over = Signal(str)
     undo_planned = Signal(object)
     detour_wanted = Signal(object)
 
@@ -297,6 +301,7 @@ class MicoWidget(QWidget):
             card = make_card(axis, self._settings_of(name), self._settings.defaults)
             card.consent_wanted.connect(self._on_consent_wanted)
             card.commands.verdict_given.connect(self.verdict_given)
+            card.commands.refusal_over.connect(partial(self.refusal_over.emit, name))
             card.commands.detour_wanted.connect(self.detour_wanted)
             card.commands.plans_detours = self._plans_detours
             card.show_stopped(self._stopped)

@@ -5,6 +5,7 @@ from typing import ClassVar, Final
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QToolButton, QVBoxLayout, QWidget
+from shiboken6 import isValid
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tipped
@@ -20,6 +21,8 @@ from cosmic.mico.gui.axis_commands import AxisCommands
 from cosmic.mico.gui.card import Card, ConfidenceMark, PositionDisplay
 from cosmic.mico.gui.collision_switch import UNWATCHED_TEXT, CollisionSwitch
 from cosmic.mico.gui.key_names import key_text
+
+_REFUSED: Final = f"{state_look(State.REFUSED).glyph} {state_look(State.REFUSED).word}: "
 
 
 class StepsPart(QWidget):
@@ -136,6 +139,7 @@ class PositionerBaseGUI(Card):
         self.commands = AxisCommands(settings.name, self)
         self._defaults = defaults
         self._note = ""
+        self._refused: QuantityField | None = None
         self._watched = True
         self._stopped = ""
         self._state: PositionerState | None = None
@@ -148,6 +152,7 @@ class PositionerBaseGUI(Card):
         self._inputs += self._list_inputs()
         self.commands.begun.connect(self._on_begun)
         self.commands.refused.connect(self._on_refused)
+        self.commands.refusal_over.connect(self._on_refusal_over)
         self.commands.ended.connect(self._on_ended)
         self.commands.noted.connect(self._set_note)
         self.commands.consent_wanted.connect(self.consent_wanted)
@@ -224,8 +229,7 @@ class PositionerBaseGUI(Card):
     def show_state(self, state: PositionerState) -> None:
         """Show the newest state of the axis."""
         self._state = state
-        if state.in_motion:
-            self.commands.note_motion()
+        self.commands.note_state(state)
         self._show_badge(STATES[state.status], state.error or self._activity_text(state))
         self._position.show_position(state.shown_position)
         self._confidence.set_confidence(state.confidence, state.std)
@@ -242,9 +246,12 @@ class PositionerBaseGUI(Card):
 
     def show_stopped(self, reason: str | None) -> None:
         """Show that the stop is latched, and why; None: movements are allowed again."""
+        was_stopped = bool(self._stopped)
         self._stopped = f"■ STOPPED: {reason}; Reset allows movements again" if reason else ""
         if reason:
             self._note = ""  # of before; what the stop ends says so afterwards
+        elif was_stopped:
+            self.commands.refusal_over.emit()
         if self._state is not None:
             self._show_badge(
                 STATES[self._state.status], self._state.error or self._activity_text(self._state)
@@ -338,10 +345,17 @@ class PositionerBaseGUI(Card):
         self._set_note("")
 
     def _on_refused(self, field: object, reason: str) -> None:
-        look = state_look(State.REFUSED)
-        self._set_note(f"{look.glyph} {look.word}: {reason}")
+        self._set_note(f"{_REFUSED}{reason}")
         if isinstance(field, QuantityField):
+            self._refused = field
             field.refuse(reason)
+
+    def _on_refusal_over(self) -> None:
+        field, self._refused = self._refused, None
+        if field is not None and isValid(field):  # that of a tool goes with the tool
+            field.end_refusal()
+        if self._note.startswith(_REFUSED):
+            self._set_note("")
 
     def _on_ended(self, why: str) -> None:
         self._set_note(f"{state_look(State.ERROR).glyph} {why}" if why else "")
