@@ -69,7 +69,7 @@ _LONG: Final = (
     sa.SA_CTL_PKEY_MOVE_ACCELERATION,
     sa.SA_CTL_PKEY_FOLLOWING_ERROR_LIMIT,
 )
-_TELLS_LONG: Final = "SA_CTL_GetProperty_i64"
+_POSITION_CALL: Final = "SA_CTL_GetProperty_i64"
 _TEXT_SIZE: Final = sa.SA_CTL_STRING_MAX_LENGTH + 1
 _FAR: Final = 10**12
 """A way that no positioner has, so that it meets its end stop: 1 m, or 1000 degrees."""
@@ -488,7 +488,7 @@ class SmaractCtlController(Controller):
         seeks_end: bool = False,
     ) -> None:
         mode = sa.SA_CTL_MOVE_MODE_CL_ABSOLUTE
-        if from_here and not self._library.has(_TELLS_LONG):
+        if from_here and not self._library.has(_POSITION_CALL):
             mode = sa.SA_CTL_MOVE_MODE_CL_RELATIVE  # the best that it can
         elif from_here:
             # The controller's own relative mode adds to the last target, also to one that was
@@ -504,7 +504,7 @@ class SmaractCtlController(Controller):
     def _here(self, channel: Channel) -> int:
         """Return the position; 0 without a sensor, where no movement begins anyway."""
         at, value, key = self._at(channel, "asking"), c_int64(), sa.SA_CTL_PKEY_POSITION
-        call = _TELLS_LONG
+        call = _POSITION_CALL
         code = self._library.call(call, at.handle, channel.channel, key, byref(value), None)
         if code in (sa.SA_CTL_ERROR_NO_SENSOR_PRESENT, sa.SA_CTL_ERROR_SENSOR_DISABLED):
             return 0
