@@ -130,6 +130,9 @@ class _Rules:
         """Look whether a campaign works: what seems to be missing then is its own business."""
         if self._rig.running != A_CAMPAIGN:
             return None
+        if self._dock is not None and self._dock.paused:
+            text = "The campaign is paused and does nothing until Resume. Abort ends it safely."
+            return Step(text, "Resume", self._dock.resume)
         text = "A campaign runs. It arms the force limit itself while the probe is out. "
         return Step(text + "Abort leaves things safe; STOP stops at once.")
 

@@ -19,7 +19,7 @@ from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.reason_bubble import ReasonBubble
 from cosmic.frame.gui.theme import STEP_PX, State, current_palette, number_font, state_look
 from cosmic.frame.overrides import override
-from cosmic.frame.units import DISPLAY, format_quantity, parse_quantity
+from cosmic.frame.units import DISPLAY, format_quantity, parse_quantity, with_micro_signs
 
 _ENTER: Final = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 _KEEPS_EDITING: Final = (
@@ -197,6 +197,7 @@ class QuantityField(QLineEdit):
         return f"{value:.{_MOST_DECIMALS}g} {DISPLAY[self._unit]}"
 
     def _set_reason(self, reason: str) -> None:
+        reason = with_micro_signs(reason)
         if reason:
             ReasonBubble.of(self).show_for(self, f"{state_look(State.REFUSED).glyph} {reason}")
         elif self._reason:

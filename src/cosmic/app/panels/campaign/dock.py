@@ -101,6 +101,13 @@ class CampaignDock(QObject):
         return campaign is not None and not campaign.over
 
     @property
+    def paused(self) -> bool:
+        """True while that waits for Resume, which goes on with it."""
+        panel = self._late.made
+        campaign = panel.campaign if panel is not None else None
+        return campaign is not None and campaign.phase == "paused"
+
+    @property
     def unfinished(self) -> bool:
         """True where the campaign begun here last ended early: it can be resumed."""
         panel = self._late.made
@@ -115,7 +122,7 @@ class CampaignDock(QObject):
         return campaign is not None and campaign.over and not campaign.unfinished
 
     def resume(self) -> None:
-        """Have the campaign that ended early go on."""
+        """Have the campaign that is paused, or ended early, go on."""
         self.panel.procedure.resume.click()
 
     def show_report(self) -> None:
