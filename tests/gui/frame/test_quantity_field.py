@@ -258,6 +258,6 @@ def _near(one: QColor, other: QColor) -> bool:
     return all(abs(a - b) < 40 for a, b in pairs)
 
 
-def test_a_refusal_is_told_in_the_units_that_the_field_shows(field: QuantityField) -> None:
+def test_a_refusal_has_the_units_that_the_field_shows(field: QuantityField) -> None:
     field.refuse("target 6000 um is outside its limit 5500 um")
     assert field.reason == "target 6000 µm is outside its limit 5500 µm"
