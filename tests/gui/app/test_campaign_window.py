@@ -129,6 +129,7 @@ def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
     qtbot.waitUntil(lambda: words.text().startswith("The campaign is paused"), timeout=60_000)
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: words.text().startswith("A campaign runs"), timeout=10_000)
+    assert "a campaign is running" in mico(window).undoing.doubt()
     window.stop("a hand on the button")
     qtbot.waitUntil(lambda: campaign.over, timeout=30_000)
     qtbot.waitUntil(lambda: panel.board.state.text() == "stopped", timeout=5_000)

@@ -263,5 +263,29 @@ def test_initialise_asks_where_a_gripper_may_hold_something(
     task.cancel()
 
 
+def test_undo_and_initialise_ask_while_something_else_moves_the_axes(
+    panel: MicoWidget, qtbot: QtBot
+) -> None:
+    card, running = panel.cards["left.x"], ["Push to 50 µN is running"]
+    panel.ask_while(lambda: running[0])
+    click(qtbot, card, "MiCoCL_6")
+    wait_for_position(qtbot, card, 100.0)
+    qtbot.waitUntil(part(panel, "undo", QPushButton).isEnabled)
+    click(qtbot, panel, "undo")
+    question = panel.undoing.question
+    assert question is not None
+    assert "Push to 50 µN is running" in question.informativeText()
+    qtbot.keyClick(question, Qt.Key.Key_Escape)
+    click(qtbot, panel, "initialise")
+    caution = panel.caution
+    assert caution is not None
+    assert "Push to 50 µN is running" in caution.informativeText()
+    qtbot.keyClick(caution, Qt.Key.Key_Escape)
+    running[0] = ""
+    click(qtbot, panel, "undo")
+    assert panel.undoing.question is None
+    wait_for_position(qtbot, card, 0.0)
+
+
 def at_rest(panel: MicoWidget, name: str) -> bool:
     return not panel.cards[name].axis.details.in_motion

@@ -167,6 +167,7 @@ class OperatorWindow(CosmicServerGui):
             right = Qt.DockWidgetArea.RightDockWidgetArea
             self.add_panel(SCENE, self._scene, right, scroll=False)
         gui.undo_planned.connect(self._scene.set_planned)
+        gui.ask_while(self._what_runs)
         self._parking = Parking(gui, self._is_moving, self)
         self._parking.failed.connect(lambda why: self.top_bar.set_message(f"not parked: {why}"))
         for asking in (self._closing, self._parking):
@@ -393,6 +394,11 @@ class OperatorWindow(CosmicServerGui):
         for name, state in mico.states().items():
             if state.in_motion:
                 mico[name].halt()
+
+    def _what_runs(self) -> str:
+        """Return what moves axes by itself, as a reason not to move them under it."""
+        running = self._rig.running
+        return f"{running} is running and moves axes itself" if running else ""
 
     def _is_moving(self) -> bool:
         """Tell whether Escape has something to stop."""

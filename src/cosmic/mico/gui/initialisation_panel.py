@@ -1,5 +1,6 @@
 """The steps of the initialisation sequence as a list, with what became of each."""
 
+from collections.abc import Callable
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
@@ -50,6 +51,11 @@ class InitialisationPanel(QWidget):
         It was begun.
     doubted(object)
         It was not begun, as something may be held or touched; a tuple of reasons.
+
+    Attributes
+    ----------
+    doubt : callable
+        Returns what speaks against it beside what the axes know; empty where nothing does.
     """
 
     refused = Signal(str)
@@ -59,6 +65,7 @@ class InitialisationPanel(QWidget):
     def __init__(self, mico: Mico, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("initialisationPanel")
+        self.doubt: Callable[[], str] = str
         self._mico = mico
         self._application = mico.application
         self._task: Task | None = None
@@ -155,7 +162,7 @@ class InitialisationPanel(QWidget):
         states = self._mico.states().values()
         grippers = (_may_hold(each) for each in states if each.present)
         reasons = self._application.cautions.reasons()
-        doubts = (*reasons, *(text for text in grippers if text))
+        doubts = tuple(text for text in (self.doubt(), *reasons, *grippers) if text)
         if doubts:
             self.doubted.emit(doubts)
         else:

@@ -1,6 +1,7 @@
 """`MicoWidget`: the MiCo panel, all positioners in their groups (thesis 6.1.4)."""
 
 import logging
+from collections.abc import Callable
 from functools import partial
 
 from PySide6.QtCore import Signal
@@ -219,6 +220,10 @@ class MicoWidget(QWidget):
     def caution(self) -> CautionDialog | None:
         """The question before an initialisation that could lose something."""
         return self._caution
+
+    def ask_while(self, doubt: Callable[[], str]) -> None:
+        """Have Undo and Initialise ask first, too, while `doubt` returns a reason."""
+        self._undoing.doubt = self._steps.doubt = doubt
 
     @property
     def undoing(self) -> UndoGui:

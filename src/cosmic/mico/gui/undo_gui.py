@@ -1,5 +1,6 @@
 """The button and the key that take the last movement back."""
 
+from collections.abc import Callable
 from typing import Final
 
 from PySide6.QtCore import QObject, Signal
@@ -30,6 +31,11 @@ class UndoGui(QObject):
         What would be taken back, and where to; empty when there is nothing.
     planned(object)
         The poses it leads through, while it is asked about or under way; None afterwards.
+
+    Attributes
+    ----------
+    doubt : callable
+        Returns what speaks against it beside what the axes know; empty where nothing does.
     """
 
     said = Signal(str, object)
@@ -38,6 +44,7 @@ class UndoGui(QObject):
 
     def __init__(self, mico: Mico, parent: QWidget) -> None:
         super().__init__(parent)
+        self.doubt: Callable[[], str] = str
         self._mico = mico
         self._window = parent
         self._question: CautionDialog | None = None
@@ -76,7 +83,7 @@ class UndoGui(QObject):
         except CosmicError as exc:
             self.said.emit(f"Undo: {exc}", State.REFUSED)
             return
-        doubts = self._mico.undo_doubts(entry)
+        doubts = tuple(text for text in (self.doubt(), *self._mico.undo_doubts(entry)) if text)
         self.planned.emit(self._poses(entry))
         if doubts:
             self._ask(entry, doubts)
