@@ -37,10 +37,13 @@ def test_a_fibre_on_a_sharpened_image_is_certain() -> None:
 def test_several_lines_along_rows_and_columns_are_drawn() -> None:
     down = np.column_stack([np.full(400, 120.0), np.linspace(100.0, 200.0, 400)])
     along = np.column_stack([np.linspace(300.0, 420.0, 400), np.full(400, 380.0)])
+    other = np.column_stack([np.linspace(300.0, 480.0, 400), np.full(400, 430.0)])
     fibre = arc((250.0, 120.0), 0.4, 200.0, 0.5)
-    found = find_fibres(drawn_image([down, along, fibre], [7.0, 7.0, 9.0]))
+    found = find_fibres(drawn_image([down, along, other, fibre], [7.0, 7.0, 7.0, 9.0]))
     assert [round(each.length_px) for each in found if each.certain] == [200]
-    assert sum(DRAWN in each.doubts for each in found) == 2
+    assert sum(DRAWN in each.doubts for each in found) == 3
+    two = find_fibres(drawn_image([down, along, fibre], [7.0, 7.0, 9.0]))
+    assert [each.certain for each in two] == [True, True, True]
 
 
 def test_the_weaker_of_two_that_are_alike_is_a_reflection() -> None:
@@ -66,3 +69,13 @@ def test_marks_of_a_frame_that_is_turned_are_copies() -> None:
     found = find_fibres(drawn_image(lines, [7.0] * 4))
     assert len(found) == 4
     assert all(COPY in each.doubts for each in found)
+
+
+@pytest.mark.parametrize("aside", [0.0, 60.0, 260.0])
+def test_two_fibres_as_long_as_each_other_may_lie_at_right_angles(aside: float) -> None:
+    way = np.linspace(-100.0, 100.0, 400)[:, None]
+    along, across = np.array([np.cos(0.5), np.sin(0.5)]), np.array([-np.sin(0.5), np.cos(0.5)])
+    centre = np.array([220.0, 180.0])
+    lines = [centre + way * along, centre + aside * along + way * across]
+    found = find_fibres(drawn_image(lines, [9.0, 9.0]))
+    assert [each.certain for each in found] == [True, True]

@@ -51,6 +51,7 @@ class Limits:
     seen: float = 0.6
     gap_widths: float = 14.0
     aslant_px: float = 0.3
+    several: int = 3
     several_aslant_px: float = 0.5
     several_aslant: float = 2e-3
     even_of_noise: float = 0.8
@@ -254,7 +255,7 @@ def drawn(scene: Scene, courses: Sequence[Course]) -> set[int]:
     """Return the lines that are drawn along rows or columns.
 
     They have less noise than the ground; or there are several, from end to end on the image or
-    from border to border: no two fibres come to lie like that.
+    from border to border: so many fibres do not come to lie like that.
     """
     even, whole = set(), set()
     for index, course in enumerate(courses):
@@ -267,7 +268,7 @@ def drawn(scene: Scene, courses: Sequence[Course]) -> set[int]:
         ):
             whole.add(index)
     several = even | whole
-    return several if len(several) > 1 else even
+    return several if len(several) >= LIMITS.several else even
 
 
 def _is_even(scene: Scene, course: Course) -> bool:

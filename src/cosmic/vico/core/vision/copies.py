@@ -18,25 +18,33 @@ ALIKE_PX: Final = 1.5
 WEAKER: Final = 0.75
 """Of the contrast of another one: then it is the copy."""
 QUARTER: Final = np.array([[0.0, 1.0], [-1.0, 0.0]])
+MARKS: Final = 3
+"""So many alike, some of them turned by a quarter: two fibres as long may lie across each other."""
 
 
 def copied(courses: Sequence[Course]) -> set[int]:
-    """Return the fibres of which another one is a copy: moved and stronger, or turned by a quarter.
+    """Return the fibres of which others are copies: moved and stronger, or turned by quarters.
 
-    Fibres as strong as each other may lie side by side alike, as cut and combed; not across.
+    Fibres as strong as each other may lie side by side alike, as cut and combed.
     """
     shapes = [_shape(course.line) for course in courses]
     contrasts = [middle(each.contrast[each.good]) if each.good.any() else 0.0 for each in courses]
+    moved: dict[int, set[int]] = {index: {index} for index in range(len(courses))}
+    turned: dict[int, set[int]] = {index: set() for index in range(len(courses))}
     found: set[int] = set()
     for i, j in combinations(range(len(courses)), 2):
         if _same(shapes[i], shapes[j] @ QUARTER):
-            found |= {i, j}
+            turned[i].add(j)
+            turned[j].add(i)
         elif _same(shapes[i], shapes[j]):
+            moved[i].add(j)
+            moved[j].add(i)
             if contrasts[i] < WEAKER * contrasts[j]:
                 found.add(i)
             elif contrasts[j] < WEAKER * contrasts[i]:
                 found.add(j)
-    return found
+    marks = (i for i in moved if turned[i] and len(moved[i] | turned[i]) >= MARKS)
+    return found.union(marks)
 
 
 def _shape(line: Floats) -> Floats:
