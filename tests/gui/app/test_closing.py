@@ -2,12 +2,13 @@
 
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.windows.closing import CloseDialog, ParkDialog
+from cosmic.app.windows.closing import CloseDialog, ParkDialog, what_is_lost
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.vico.api.vico import vico_of
 from gui.app.windows import Make, mico
@@ -93,6 +94,15 @@ def test_closing_asks_while_images_are_recorded(make: Make, qtbot: QtBot, tmp_pa
     qtbot.waitUntil(lambda: question(window) is None)
     window.close()
     assert not window.isVisible()
+
+
+@pytest.mark.parametrize(("remote", "asked"), [("", 1), ("fibervision", 0)])
+def test_images_that_a_station_records_go_on_without_the_window(remote: str, asked: int) -> None:
+    recording = SimpleNamespace(active=True, path=Path("film"))
+    camera = SimpleNamespace(remote=remote, recording=recording)
+    vico = SimpleNamespace(cameras=("microscope",), camera=lambda _name: camera)
+    rig: Any = SimpleNamespace(running="", vico=vico)
+    assert len(what_is_lost(rig, None, force=False)) == asked
 
 
 def test_the_end_of_the_program_waits_for_no_answer(recording: OperatorWindow) -> None:

@@ -118,6 +118,21 @@ def test_another_campaign_shows_nothing_of_the_one_before(
     assert card.title.text() == "no fibre chosen"
 
 
+def test_a_fibre_that_comes_when_another_campaign_is_chosen_is_not_shown(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_campaign(tmp_path / "pine")
+    CampaignStore.create(tmp_path / "birch", INFO).close()
+    choose(panel, qtbot, "pine")
+    qtbot.waitUntil(lambda: fibres(panel) == "1 good, 1 failed")
+    panel.campaign.show_fibre(1)
+    panel.campaign.show_campaign(tmp_path / "birch")
+    qtbot.waitUntil(lambda: fibres(panel) == "0")
+    card = panel.campaign.card
+    assert card is not None
+    assert card.title.text() == "no fibre chosen"
+
+
 def test_what_was_added_is_seen_by_looking_again(
     panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:

@@ -44,7 +44,8 @@ def what_is_lost(rig: Rig, operations: FibreOperations | None, *, force: bool) -
             f"The {handling.held_by} gripper holds a fibre: it stays in the jaws, and nothing "
             "knows of it at the next start. Put it away first."
         )
-    found += [f"The recording {name} ends; what it has is kept." for name in _force(rig) if force]
+    recorded = _force(rig) if force else []
+    found += [f"The recording {name} ends; what it has is kept." for name in recorded]
     found += [f"The images {name} end; what they have is kept." for name in _images(rig)]
     return tuple(found)
 
