@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 from PySide6.QtWidgets import QAbstractButton, QLabel, QWidget
 from pytestqt.qtbot import QtBot
@@ -213,6 +215,23 @@ def test_a_refusal_is_shown_until_the_axis_moves_by_anything(
     qtbot.waitUntil(lambda: part(card, "status", QLabel).text() == "±5500 µm travel")
     assert not entry.reason
     assert entry.text() == "9000.0"
+
+
+def test_a_state_from_before_a_refusal_does_not_end_it(panel: MicoWidget, qtbot: QtBot) -> None:
+    """On a busy computer the card is shown late that the axis moved."""
+    card = panel.cards["left.x"]
+    entry = field(card, "target")
+    before = card.axis.details
+    panel.mico["left.x"].move_to(50.0)
+    enter(qtbot, entry, "9 mm")
+    click(qtbot, card, "MiCoCL_9")
+    qtbot.waitUntil(lambda: bool(entry.reason))
+    card.show_state(replace(before, in_motion=True))
+    card.show_state(before)
+    card.show_state(card.axis.details)
+    assert entry.reason
+    panel.mico["left.x"].move_to(500.0, wait=False)
+    qtbot.waitUntil(lambda: not entry.reason)
 
 
 def test_a_refusal_by_the_stop_ends_with_the_reset(panel: MicoWidget, qtbot: QtBot) -> None:

@@ -87,7 +87,11 @@ def export_file(
     except ConfigError as exc:
         raise RecordingError(f"cannot export to {to!r}: {exc}") from exc
     source = Path(recording_path)
-    if source.is_dir():
+    try:
+        folder = source.is_dir()
+    except OSError as exc:  # a name that no file can have
+        raise RecordingError(f"{str(source)[:80]}: cannot be read ({exc.strerror})") from exc
+    if folder:
         raise RecordingError(f"{source}: is a directory; name a recording in it")
     target = source.with_suffix(f".{to}") if out_path is None else Path(out_path)
     with open_recording(source) as recording:
@@ -222,14 +226,14 @@ def _check_other(recording: Recording, path: Path) -> None:
 
 def _check_free(recording: Recording, path: Path, *, overwrite: bool) -> None:
     _check_other(recording, path)
-    if not path.parent.is_dir():
-        raise RecordingError(f"directory {path.parent} does not exist; create it or choose another")
     try:
-        there = path.exists()
+        folder, there = path.parent.is_dir(), path.exists()
     except OSError as exc:
         raise RecordingError(
-            f"{path}: is no name of a file ({exc.strerror}); choose another"
+            f"{str(path)[:80]}: is no name of a file ({exc.strerror}); choose another"
         ) from exc
+    if not folder:
+        raise RecordingError(f"directory {path.parent} does not exist; create it or choose another")
     if there and not overwrite:
         raise RecordingExistsError(
             f"{path}: there is such a file; choose another name, or say that it may be replaced"

@@ -37,7 +37,7 @@ from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.companion import MicoCompanion
-from cosmic.mico.api.entry import Number, as_number, source_of
+from cosmic.mico.api.entry import Number, as_number, one_line, source_of
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.live_clearance import LiveClearance
@@ -603,7 +603,7 @@ class Mico(Declared):
         said = (
             reason
             if call is None
-            else f"{reason_of(reason) or 'stopped'} (from {call.caller.name})"
+            else f"{one_line(reason_of(reason)) or 'stopped'} (from {call.caller.name})"
         )
         self._manager.stop(said)
 

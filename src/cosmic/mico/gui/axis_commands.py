@@ -92,6 +92,7 @@ class AxisCommands(QObject):
         self._series: StepwiseMove | None = None
         self._moved = self._moving = False
         self._rested_at: float | None = None
+        self._refused_wall_s = 0.0
         self._blocked: _Command | None = None
         self.plans_detours = False
         """Have a detour planned where something stands in the way of a move to a goal."""
@@ -104,8 +105,10 @@ class AxisCommands(QObject):
 
     def note_state(self, state: PositionerState) -> None:
         """Take what is seen of the axis: moving, a stop interrupts it and refuses nothing."""
-        here, before = state.position, self._rested_at
         self._moved = self._moved or state.in_motion
+        if state.read_wall_s < self._refused_wall_s:
+            return
+        here, before = state.position, self._rested_at
         begins = state.in_motion and not self._moving
         # A short movement is over before it is seen.
         away = here is not None and before is not None and abs(here - before) > SEEN[state.unit]
@@ -113,6 +116,11 @@ class AxisCommands(QObject):
         self._rested_at = None if state.in_motion else here
         if begins or away:
             self.refusal_over.emit()
+
+    def note_refusal(self, state: PositionerState) -> None:
+        """Take the newest state at a refusal: on a busy computer older ones are seen after it."""
+        self._refused_wall_s, self._moving = state.read_wall_s, state.in_motion
+        self._rested_at = None if state.in_motion else state.position
 
     def issue(
         self, what: str, make: Make, field: QWidget | None = None, *, goal: Goal | None = None

@@ -346,6 +346,7 @@ class PositionerBaseGUI(Card):
 
     def _on_refused(self, field: object, reason: str) -> None:
         self._set_note(f"{_REFUSED}{reason}")
+        self.commands.note_refusal(self.axis.details)
         if isinstance(field, QuantityField):
             self._refused = field
             field.refuse(reason)
