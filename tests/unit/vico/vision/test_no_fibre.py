@@ -4,8 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from cosmic.vico.core.vision.checks import DRAWN, EMBOSSED
-from cosmic.vico.core.vision.copies import COPY
+from cosmic.vico.core.vision.checks import COPY, DRAWN, EMBOSSED
 from cosmic.vico.core.vision.finding import find_fibres
 from unit.vico.vision.drawn_fibres import arc, drawn_image, strip
 

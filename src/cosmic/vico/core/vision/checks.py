@@ -1,11 +1,9 @@
 """Reasons not to rely on what was found."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.spatial import cKDTree
 
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.grey import Floats, middle, middles, quantile
@@ -27,6 +25,7 @@ RUNS_ON = (EndKind.BODY, EndKind.LOST)
 EDGING = "it lies along the edge of something wider"
 DIRTY_END = "at an end its edges are not seen: dirt may lie there"
 DRAWN = "it is as straight and as even as a line drawn into the picture: a scale bar, or a frame"
+COPY = "another one has the same shape: it may be a reflection, or a mark that was drawn"
 SHARP = "it bends more sharply than its own width"
 EMBOSSED = "a dark band and a light one lie along each other: a scratch, or lit from a side"
 # Of stretches along a fibre, what such a share differ by at most is its own unevenness.
@@ -50,14 +49,7 @@ class Limits:
     width_spread: float = 0.3
     seen: float = 0.6
     gap_widths: float = 14.0
-    aslant_px: float = 0.3
-    several: int = 3
-    several_aslant_px: float = 0.5
-    several_aslant: float = 2e-3
-    even_of_noise: float = 0.8
     other_side: float = 0.2
-    torn_px: float = 1.5
-    torn_reach_px: float = 64.0
     clipped: float = 0.005
     same_level: float = 0.01
 
@@ -185,59 +177,6 @@ def sharpest_turn(course: Course) -> float:
     return float(np.abs(turn).max()) if len(turn) else 0.0
 
 
-def continued(courses: Sequence[Course]) -> set[int]:
-    """Return the fibres at an end of which another one, or their own other end, goes on.
-
-    Ends so near that they may touch are one broken fibre at any angle, as far as is known; so is
-    one that begins at the end of another with an end that cannot be told from that.
-    """
-    found: set[int] = set()
-    ends = [
-        (index, each.line[at], outward(each.line, at), end.kind in RUNS_ON)
-        for index, each in enumerate(courses)
-        for at, end in zip((0, -1), each.ends, strict=True)
-    ]
-    if not ends:
-        return found
-    widths = [each.width for each in courses]
-    points = np.array([point for _, point, _, _ in ends])
-    for first, last in cKDTree(points).query_pairs(4.0 * max(widths) + LIMITS.torn_reach_px):
-        (i, point, out, runs), (j, other, other_out, other_runs) = ends[first], ends[last]
-        step = other - point
-        gap = float(np.linalg.norm(step))
-        both = widths[i] + widths[j]
-        if i != j and gap < (both + 12.0 if runs or other_runs else 0.9 * both + 6.0):
-            found |= {i, j}
-        elif gap <= 2.0 * both + 30.0:
-            step /= max(gap, 1e-9)
-            if float(out @ step) > 0.8 and float(other_out @ -step) > 0.8:
-                found |= {i, j}
-        if i != j and _torn(other - point, out, other_out):
-            found |= {i, j}
-    return found
-
-
-def _torn(step: Floats, out: Floats, other_out: Floats) -> bool:
-    """Return whether two ends face each other across a row or a column, shifted along it.
-
-    So an image is torn whose halves were taken one after another, or put together.
-    """
-    across = int(np.argmin(np.abs(step)))
-    return (
-        float(np.abs(step).min()) < LIMITS.torn_px
-        and float(np.abs(step).max()) < LIMITS.torn_reach_px
-        and float(out @ other_out) < -0.8
-        and float(out[across] * other_out[across]) < -0.1
-    )
-
-
-def outward(line: Floats, at: int) -> Floats:
-    """Return the direction in which a line leaves its first (0) or last (-1) point."""
-    inner = min(8, len(line) - 1)
-    step = line[0] - line[inner] if at == 0 else line[-1] - line[-1 - inner]
-    return np.asarray(step / max(float(np.linalg.norm(step)), 1e-9))
-
-
 def is_clipped(scene: Scene, course: Course) -> bool:
     """Return whether the ground is at the end of the range, without noise, and the fibre is not."""
     if course.noise > 0.0 or not course.good.any():
@@ -249,32 +188,3 @@ def is_clipped(scene: Scene, course: Course) -> bool:
     levels = sample(scene.image, x, y)[0].astype(np.float64)
     spread = middle(np.abs(levels - middle(levels)))
     return spread > LIMITS.clipped * middle(course.contrast[course.good])
-
-
-def drawn(scene: Scene, courses: Sequence[Course]) -> set[int]:
-    """Return the lines that are drawn along rows or columns.
-
-    They have less noise than the ground; or there are several, from end to end on the image or
-    from border to border: so many fibres do not come to lie like that.
-    """
-    even, whole = set(), set()
-    for index, course in enumerate(courses):
-        aside, length = np.sort(np.ptp(course.line, axis=0)).tolist()
-        if aside <= LIMITS.aslant_px and _is_even(scene, course):
-            even.add(index)
-        kinds = {end.kind for end in course.ends}
-        if aside <= max(LIMITS.several_aslant_px, LIMITS.several_aslant * length) and (
-            kinds in ({EndKind.FREE}, {EndKind.BORDER})
-        ):
-            whole.add(index)
-    several = even | whole
-    return several if len(several) >= LIMITS.several else even
-
-
-def _is_even(scene: Scene, course: Course) -> bool:
-    """Return whether a line has less noise than the ground."""
-    x, y = (course.line[:, axis].astype(np.float32)[None] for axis in (0, 1))
-    levels = sample(scene.image, x, y)[0].astype(np.float64)
-    inner = levels[len(levels) // 8 : len(levels) - len(levels) // 8]
-    spread = 1.4826 * middle(np.abs(inner - middle(inner)))
-    return spread < LIMITS.even_of_noise * course.noise

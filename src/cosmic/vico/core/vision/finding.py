@@ -12,9 +12,9 @@ from cosmic.vico.core.vision import (
     beyond,
     certainty,
     checks,
-    copies,
-    fragments,
+    marks,
     picture_edge,
+    pieces,
 )
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
@@ -283,13 +283,10 @@ def checked_fibres(
     widths = [course.width for course in measured]
     explained = explained_by(scene, lines, widths)
     together = (
-        (checks.drawn(scene, measured), checks.DRAWN),
-        (copies.copied(measured), copies.COPY),
+        (marks.drawn(scene, measured), checks.DRAWN),
+        (marks.copied(measured), checks.COPY),
         (set(range(len(courses))) if crowd else set(), checks.CROWDED),
-        (
-            checks.continued(measured) | fragments.broken_off(scene, measured, explained),
-            checks.CONTINUES,
-        ),
+        (pieces.in_pieces(scene, measured, explained), checks.CONTINUES),
         (left_over(scene, lines, widths, explained), checks.LEFT_OVER),
     )
     sections = pooled([section_of(scene, course) for course in measured])

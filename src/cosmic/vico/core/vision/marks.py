@@ -1,4 +1,4 @@
-"""What is on an image twice: a reflection, or the marks of a frame."""
+"""Lines that are no fibres: drawn into an image as scale bars and frames, or on it twice."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -6,12 +6,16 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.grey import Floats, middle
+from cosmic.vico.core.vision.profiles import Scene, sample
 from cosmic.vico.core.vision.refine import Course
 from cosmic.vico.core.vision.smoothing import arc_lengths
 
-COPY: Final = "another one has the same shape: it may be a reflection, or a mark that was drawn"
-
+ASLANT_PX: Final = 0.3
+SEVERAL_ASLANT_PX: Final = 0.5
+SEVERAL_ASLANT: Final = 2e-3
+EVEN_OF_NOISE: Final = 0.8
 POINTS: Final = 9
 """At which courses are compared."""
 ALIKE_PX: Final = 1.5
@@ -19,7 +23,36 @@ WEAKER: Final = 0.75
 """Of the contrast of another one: then it is the copy."""
 QUARTER: Final = np.array([[0.0, 1.0], [-1.0, 0.0]])
 MARKS: Final = 3
-"""So many alike, some of them turned by a quarter: two fibres as long may lie across each other."""
+"""So many lines along rows and columns, or alike and turned by quarters; two may be fibres."""
+
+
+def drawn(scene: Scene, courses: Sequence[Course]) -> set[int]:
+    """Return the lines that are drawn along rows or columns.
+
+    They have less noise than the ground; or there are several, from end to end on the image or
+    from border to border: so many fibres do not come to lie like that.
+    """
+    even, whole = set(), set()
+    for index, course in enumerate(courses):
+        aside, length = np.sort(np.ptp(course.line, axis=0)).tolist()
+        if aside <= ASLANT_PX and _is_even(scene, course):
+            even.add(index)
+        kinds = {end.kind for end in course.ends}
+        if aside <= max(SEVERAL_ASLANT_PX, SEVERAL_ASLANT * length) and (
+            kinds in ({EndKind.FREE}, {EndKind.BORDER})
+        ):
+            whole.add(index)
+    several = even | whole
+    return several if len(several) >= MARKS else even
+
+
+def _is_even(scene: Scene, course: Course) -> bool:
+    """Return whether a line has less noise than the ground."""
+    x, y = (course.line[:, axis].astype(np.float32)[None] for axis in (0, 1))
+    levels = sample(scene.image, x, y)[0].astype(np.float64)
+    inner = levels[len(levels) // 8 : len(levels) - len(levels) // 8]
+    spread = 1.4826 * middle(np.abs(inner - middle(inner)))
+    return spread < EVEN_OF_NOISE * course.noise
 
 
 def copied(courses: Sequence[Course]) -> set[int]:
