@@ -10,6 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QTreeWidgetItem
 from pytestqt.qtbot import QtBot
 
+from cosmic.app.panels.campaign.fibre_card import FibreCard
 from cosmic.app.panels.campaign.table import NUMBER
 from cosmic.app.panels.results.panel import ResultsPanel
 from cosmic.autonomy.campaign.store import CampaignStore
@@ -60,6 +61,16 @@ def fibres(panel: ResultsPanel) -> str:
     return board.fibres.value.text() if board is not None and board.isVisible() else ""
 
 
+def shown(panel: ResultsPanel, qtbot: QtBot, folder: Path) -> FibreCard:
+    """Write a campaign, choose it, and wait for it; returns the card of its fibres."""
+    write_campaign(folder)
+    choose(panel, qtbot, folder.name)
+    qtbot.waitUntil(lambda: fibres(panel) == "1 good, 1 failed")
+    card = panel.campaign.card
+    assert card is not None
+    return card
+
+
 def test_a_campaign_of_before_shows_how_it_went_and_its_fibres(
     panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:
@@ -105,13 +116,9 @@ def test_a_campaign_has_an_image_of_its_first_fibre_in_the_list(
 def test_another_campaign_shows_nothing_of_the_one_before(
     panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:
-    write_campaign(tmp_path / "pine")
     CampaignStore.create(tmp_path / "birch", INFO).close()
-    choose(panel, qtbot, "pine")
-    qtbot.waitUntil(lambda: fibres(panel) == "1 good, 1 failed")
+    card = shown(panel, qtbot, tmp_path / "pine")
     panel.campaign.show_fibre(1)
-    card = panel.campaign.card
-    assert card is not None
     qtbot.waitUntil(card.isVisible)
     choose(panel, qtbot, "birch")
     qtbot.waitUntil(lambda: fibres(panel) == "0")
@@ -121,15 +128,11 @@ def test_another_campaign_shows_nothing_of_the_one_before(
 def test_a_fibre_that_comes_when_another_campaign_is_chosen_is_not_shown(
     panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:
-    write_campaign(tmp_path / "pine")
     CampaignStore.create(tmp_path / "birch", INFO).close()
-    choose(panel, qtbot, "pine")
-    qtbot.waitUntil(lambda: fibres(panel) == "1 good, 1 failed")
+    card = shown(panel, qtbot, tmp_path / "pine")
     panel.campaign.show_fibre(1)
     panel.campaign.show_campaign(tmp_path / "birch")
     qtbot.waitUntil(lambda: fibres(panel) == "0")
-    card = panel.campaign.card
-    assert card is not None
     assert card.title.text() == "no fibre chosen"
 
 

@@ -20,6 +20,7 @@ from cosmic.frame.operation import Operation
 
 if TYPE_CHECKING:
     from cosmic.app.panels.campaign.panel import CampaignPanel
+    from cosmic.autonomy.campaign.campaign import Campaign
     from cosmic.autonomy.campaign.records import FibreRecord
 
 CAMPAIGN: Final = "Campaign"
@@ -87,38 +88,39 @@ class CampaignDock(QObject):
         return panel
 
     @property
+    def _campaign(self) -> "Campaign | None":
+        """The campaign begun here last."""
+        panel = self._late.made
+        return None if panel is None else panel.campaign
+
+    @property
     def home(self) -> Path:
         """Where the campaign begun here last lies; before one, where they are made."""
-        panel = self._late.made
-        campaign = panel.campaign if panel is not None else None
+        campaign = self._campaign
         return campaigns_folder() if campaign is None else campaign.store.folder.parent
 
     @property
     def running(self) -> bool:
         """True while a campaign that was begun here is running."""
-        panel = self._late.made
-        campaign = panel.campaign if panel is not None else None
+        campaign = self._campaign
         return campaign is not None and not campaign.over
 
     @property
     def paused(self) -> bool:
         """True while that waits for Resume, which goes on with it."""
-        panel = self._late.made
-        campaign = panel.campaign if panel is not None else None
+        campaign = self._campaign
         return campaign is not None and campaign.phase == "paused"
 
     @property
     def unfinished(self) -> bool:
         """True where the campaign begun here last ended early: it can be resumed."""
-        panel = self._late.made
-        campaign = panel.campaign if panel is not None else None
+        campaign = self._campaign
         return campaign is not None and campaign.over and campaign.unfinished
 
     @property
     def finished(self) -> bool:
         """True where the campaign begun here last came to its end."""
-        panel = self._late.made
-        campaign = panel.campaign if panel is not None else None
+        campaign = self._campaign
         return campaign is not None and campaign.over and not campaign.unfinished
 
     def resume(self) -> None:

@@ -48,7 +48,7 @@ class CampaignPage(QWidget):
         self.board: CampaignBoard | None = None
         self.card: FibreCard | None = None
         self._read = Relay(self._on_read)
-        self._fibre_read = Relay(self._on_fibre_read)
+        self._card_read = Relay(self._on_card_read)
         self.about = named(ElidedLabel(), "campaignFolder")
         self.about.set_dim(True)
         self.report = named(
@@ -80,13 +80,13 @@ class CampaignPage(QWidget):
                 self.card.clear()
         self._folder = folder
         self.about.set_text(str(folder))
-        self._jobs.do(lambda: (folder, read_campaign(folder)), self._read)
+        self._jobs.do(lambda: (folder, read_board(folder)), self._read)
 
     def show_fibre(self, number: int) -> None:
         """Have the card of a fibre read and shown; returns at once."""
         folder = self._folder
         if folder is not None:
-            self._jobs.do(lambda: (folder, read_fibre(folder, number)), self._fibre_read)
+            self._jobs.do(lambda: (folder, read_card(folder, number)), self._card_read)
 
     def _on_read(
         self, found: "tuple[Path, CampaignSnapshot] | None", error: CosmicError | None
@@ -97,7 +97,7 @@ class CampaignPage(QWidget):
             self._made_board().set_state(found[1])
             self.tabs.show()
 
-    def _on_fibre_read(
+    def _on_card_read(
         self, found: "tuple[Path, FibreCardData] | None", error: CosmicError | None
     ) -> None:
         if found is None:
@@ -119,7 +119,7 @@ class CampaignPage(QWidget):
         return self.board
 
 
-def read_campaign(folder: Path) -> "CampaignSnapshot":
+def read_board(folder: Path) -> "CampaignSnapshot":
     """Return what the board shows of the campaign in a folder; raises `CampaignError`."""
     from cosmic.autonomy.campaign.snapshot import snapshot_of
     from cosmic.autonomy.campaign.statistics import progress
@@ -138,7 +138,7 @@ def read_campaign(folder: Path) -> "CampaignSnapshot":
     )
 
 
-def read_fibre(folder: Path, number: int) -> "FibreCardData":
+def read_card(folder: Path, number: int) -> "FibreCardData":
     """Return what the card shows of a fibre; raises `CampaignError`."""
     from cosmic.autonomy.campaign.snapshot import card_of
     from cosmic.autonomy.campaign.store_read import CampaignReader
