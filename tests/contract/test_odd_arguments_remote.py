@@ -80,6 +80,17 @@ def test_a_stop_is_carried_out_whatever_reason_it_is_given(mico: Mico, reason: A
     mico.reset_stop()
 
 
+@pytest.mark.parametrize("reason", REASONS, ids=lambda reason: type(reason).__name__)
+def test_so_it_is_where_the_axes_are(reason: Any) -> None:
+    with hosted_mico(rate=50.0) as hosted:
+        mico = hosted.mico
+        move = mico["left.x"].move_to(2000.0, wait=False)
+        mico.stop(reason)
+        assert isinstance(move.exception(5.0), StoppedError)
+        assert mico.stop_state.reason
+        mico.reset_stop()
+
+
 @pytest.mark.parametrize("name", THINGS)
 def test_odd_arguments_of_what_is_remote_are_named_and_break_nothing(mico: Mico, name: str) -> None:
     wrong: dict[str, None] = {}
