@@ -171,7 +171,7 @@ def by_beam(rig: Rig, ei_n_m2: float, expanded_percent: float, times: int) -> in
     scale = bent(rig, settings, times)
     sys.stdout.write(f"{scale_words(scale)}\n")
     for number, each in enumerate(scale.standards, 1):
-        off = f"{100.0 * each.off_part:+.2f} ± {200.0 * each.off_std_part:.2f} %"
+        off = f"{each.off_percent:+.2f} ± {200.0 * each.off_std_part:.2f} %"
         sys.stdout.write(f"  {number}: {each.refused or off}\n")
     return 0 if scale.verified else NOT_VERIFIED
 

@@ -19,6 +19,7 @@ from cosmic.autonomy.bending.inference import (
 from cosmic.autonomy.bending.population import Assessed, Population, assess
 from cosmic.autonomy.bending.response import Response, direction_by_touch, response_of, straight
 from cosmic.autonomy.bending.result import (
+    DRIFT_FORM,
     N_M2_PER_UN_UM2,
     UN_UM2_PER_N_M2,
     BendingError,
@@ -274,14 +275,14 @@ def assess_campaign(
         for each, result, reading in zip(standards, alone, found.readings, strict=True)
     )
     settings = found.settings
-    every = [*fibres, *(standards[n] for n in found.used)]
+    every = _unsure([*fibres, *(standards[n] for n in found.used)], found.jump_part)
     verified = bool(found.used)
     assessed = _assessed(every, settings)
     rubs = settings.friction + float(assessed.common.mean[FRICTION]) if assessed else 0.0
     if assessed and abs(rubs - settings.friction) > NEAR:
         # What friction does is no straight line: it is taken again about where it lies.
         rubs = min(max(rubs, LEAST_RUB), MOST_RUB)
-        every = [each.about(rubs) for each in every]
+        every = _unsure([each.about(rubs) for each in every], found.jump_part)
         assessed = _assessed(every, settings, friction=rubs)
     else:
         rubs = settings.friction
@@ -294,6 +295,25 @@ def assess_campaign(
     )
     common = assessed.common if assessed else common_prior(settings)
     return CampaignFit(results, alone, scale_of(common, found, verified=verified), rubs)
+
+
+def _unsure(measured: Sequence[MeasuredFibre], jump_part: float) -> list[MeasuredFibre]:
+    """Return the same where the scale changed by a part between begin and end, but not known when.
+
+    A jump anywhere between is off the even drift that is followed by so much.
+    """
+    return [
+        each
+        if each.readings is None or not jump_part
+        else replace(each, readings=_with_jump(each.readings, each.part, jump_part))
+        for each in measured
+    ]
+
+
+def _with_jump(readings: Readings, part: float, jump_part: float) -> Readings:
+    std = jump_part * math.sqrt(max(part * (1.0 - part), 0.0))
+    line = (DRIFT_FORM, "", np.ones(len(readings.log_k)), 0.0, std)
+    return replace(readings, own=(*readings.own, line))
 
 
 def _as_read(

@@ -55,6 +55,9 @@ COMMON_SOURCES: Final = (
 )
 """Contributions to the budget that all fibres of a campaign share, in the order of the fit."""
 
+DRIFT_FORM: Final = "how the scale changed between two standards"
+"""Another one that they share."""
+
 
 class Kind(StrEnum):
     """How a contribution to the uncertainty is known, after GUM."""
@@ -89,7 +92,7 @@ class Contribution:
     @property
     def common(self) -> bool:
         """Whether it is the same for all fibres of a campaign: their mean does not lessen it."""
-        return self.source in COMMON_SOURCES
+        return self.source in (*COMMON_SOURCES, DRIFT_FORM)
 
 
 @renamed_fields(ways_correlation="branches_correlation")

@@ -4,7 +4,8 @@ Each standard is a beam of certified stiffness, bent by the same operations as a
 says how much too high the sensor reads, whatever the sensor's certificate has. Where standards
 contradict that certificate, or drift by more than foreseen, what is known beforehand of scale and
 drift is made as wide as what they show, so that they decide; where they contradict each other, or
-are no good measurements, they are refused with the reason.
+are no good measurements, they are refused with the reason, and the scale is known no better than
+they show.
 """
 
 import math
@@ -33,6 +34,9 @@ UNFORESEEN: Final = 2.0
 """Standard deviations beyond which the standard decides; nearer, both count as they are known."""
 
 DRIFTS: Final = 2.0
+LEAST_FOR_A_LINE: Final = 3
+"""So many standards show whether the scale drifts evenly."""
+
 EXACT: Final = 1e-6
 DISAGREE: Final = 1e-3
 ALIKE: Final = {
@@ -55,8 +59,8 @@ class StandardReading:
     part : float
         Of the campaign that was over, 0 to 1.
     off_part, off_std_part : float
-        How much too high the sensor reads by it alone, as a part, and the standard uncertainty of
-        that with the certificate's; nan where it has no stiffness.
+        How much too high the sensor reads by it alone, ln, and the standard uncertainty of that
+        with the certificate's; nan where it has no stiffness.
     alike_std_part : float
         The same without what all standards of a campaign have in common.
     refused : str
@@ -68,6 +72,11 @@ class StandardReading:
     off_std_part: float = math.nan
     alike_std_part: float = math.nan
     refused: str = ""
+
+    @property
+    def off_percent(self) -> float:
+        """How much too high the sensor reads by it alone."""
+        return 100.0 * math.expm1(self.off_part)
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,11 +115,15 @@ class CheckedStandards:
     ----------
     settings : FitSettings
         With what is known beforehand of scale and drift as wide as the standards ask for.
+    jump_part : float
+        Change of the scale that two standards alone show: whether it came little by little or at
+        once they cannot tell.
     """
 
     readings: tuple[StandardReading, ...]
     settings: FitSettings
     reasons: tuple[str, ...]
+    jump_part: float = 0.0
 
     @property
     def used(self) -> tuple[int, ...]:
@@ -138,21 +151,33 @@ def check_standards(
     if not agree:
         text = "the standards contradict each other by more than noise and drift explain"
         readings = [replace(each, refused=each.refused or text) for each in readings]
-        return CheckedStandards(tuple(readings), settings, (*reasons, text))
+        # Whatever made them differ makes fibres differ too.
+        shown = math.sqrt(sum(each.off_part**2 for each in good) / len(good))
+        wide = {"gain_std_part": min(max(settings.gain_std_part, shown), 1.0)}
+        return CheckedStandards(tuple(readings), settings.model_copy(update=wide), (*reasons, text))
     wider: dict[str, float] = {}
+    jump = 0.0
     std = min(each.off_std_part for each in good)
     foreseen = math.hypot(settings.gain_std_part, std)
     if abs(off) > UNFORESEEN * foreseen:
         wider["gain_std_part"] = min(abs(off), 1.0)
     if drifts:
         wider["gain_drift_std_part"] = min(abs(slope), 1.0)
-        reasons.append(f"the scale drifts by {100.0 * slope:+.1f} % over the campaign")
+        reasons.append(f"the scale drifts by {100.0 * math.expm1(slope):+.1f} % over the campaign")
+        if len(good) < LEAST_FOR_A_LINE:
+            jump = abs(slope)
+            reasons.append(
+                "two standards do not tell whether it changed little by little or at once: measure "
+                "one in the middle too"
+            )
     if abs(off) > CONTRADICTS * foreseen:
         reasons.append(
-            f"the standard contradicts the sensor's certificate by {100.0 * off:+.1f} %: "
-            "have the sensor calibrated"
+            "the standard contradicts the sensor's certificate by "
+            f"{100.0 * math.expm1(off):+.1f} %: have the sensor calibrated"
         )
-    return CheckedStandards(tuple(readings), settings.model_copy(update=wider), tuple(reasons))
+    return CheckedStandards(
+        tuple(readings), settings.model_copy(update=wider), tuple(reasons), jump
+    )
 
 
 def scale_of(common: Common, found: CheckedStandards, *, verified: bool) -> ForceScale:
@@ -163,7 +188,7 @@ def scale_of(common: Common, found: CheckedStandards, *, verified: bool) -> Forc
         verified=verified,
         off_part=math.expm1(float(middle @ common.mean)),
         off_std_part=math.sqrt(float(middle @ common.covariance @ middle)),
-        drift_part=float(common.mean[DRIFT]),
+        drift_part=math.expm1(float(common.mean[DRIFT])),
         drift_std_part=math.sqrt(float(common.covariance[DRIFT, DRIFT])),
         standards=found.readings,
         reasons=found.reasons,

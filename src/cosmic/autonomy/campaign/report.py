@@ -449,7 +449,7 @@ def _standard_rows(scale: ForceScale | None) -> list[tuple[str, ...]]:
         (
             str(order),
             f"{100.0 * each.part:.0f} %",
-            f"{number(100.0 * each.off_part, 1)} ± {number(200.0 * each.off_std_part, 1)} %",
+            f"{number(each.off_percent, 1)} ± {number(200.0 * each.off_std_part, 1)} %",
             each.refused or "used",
         )
         for order, each in enumerate(scale.standards, 1)

@@ -14,6 +14,7 @@ from cosmic.autonomy.bending.fit import (
     measure_fibre,
 )
 from cosmic.autonomy.bending.population import assess
+from cosmic.autonomy.bending.result import DRIFT_FORM, BendingResult
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.standards import ForceScale
 from oracles.sealed_session import STANDARD_EI, Fibre, Session, World
@@ -116,6 +117,42 @@ def test_standards_that_contradict_each_other_verify_nothing() -> None:
     scale = scale_of(1.0, 1.25, 1.0)
     assert not scale.verified
     assert "contradict each other" in "".join(scale.reasons)
+
+
+def fibre_between(*gains: float, at: float) -> tuple[ForceScale, float, BendingResult]:
+    """Return what standards over a campaign say, and a fibre with its gain, at a part of it."""
+    session = Session(WORLD, np.random.default_rng(5))
+    beam, standards = Fibre.standard(session), []
+    for number, session.gain in enumerate(gains):
+        part = number / (len(gains) - 1)
+        standards.append(measured(session, beam, CERTIFICATE).at(part))
+    session.gain = gains[0]
+    fibre = dataclasses.replace(Fibre.drawn(session), ei=5e7)
+    found = assess_campaign(
+        [measured(session, fibre).at(at)], standards=standards, settings=SETTINGS
+    )
+    return found.scale, fibre.true_ei(600.0) * SCALE, found.fibres[0]
+
+
+def test_what_jumped_between_two_standards_may_be_anywhere_between_both() -> None:
+    scale, true, fibre = fibre_between(1.0, 1.2, at=0.6)
+    assert "little by little or at once" in "".join(scale.reasons)
+    assert fibre.ei_low_n_m2 < true < fibre.ei_high_n_m2, "it had not jumped yet"
+    assert any(line.source == DRIFT_FORM and line.common for line in fibre.budget)
+
+
+def test_where_standards_contradict_each_other_the_scale_is_known_no_better_than_that() -> None:
+    scale, _, fibre = fibre_between(1.0, 1.25, 1.0, at=0.5)
+    assert scale.off_std_part > 0.1
+    assert half_width_percent(fibre) > 20.0
+    _, _, fibre = fibre_between(1.0, 1.0, 1.0, at=0.5)
+    assert half_width_percent(fibre) < 10.0
+
+
+def test_each_standard_is_told_in_per_cent_and_not_in_logarithms() -> None:
+    (one,) = scale_of(1.2).standards
+    assert one.off_percent == pytest.approx(20.0, abs=3.5)
+    assert one.off_percent == pytest.approx(100.0 * np.expm1(one.off_part))
 
 
 def test_a_beam_of_another_stiffness_is_refused_as_a_standard() -> None:
