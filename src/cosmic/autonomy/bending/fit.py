@@ -7,12 +7,12 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.autonomy.bending.budget import budget_of
 from cosmic.autonomy.bending.checks import checked
 from cosmic.autonomy.bending.inference import (
     DRIFT,
     FRICTION,
     Readings,
-    budget_of,
     common_prior,
     readings_of,
 )

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import chdtrc, ndtr
 
 from cosmic.autonomy.bending.response import LaidOut, Response
-from cosmic.autonomy.bending.result import COMMON_SOURCES, Contribution, Floats, Kind, SpanFit
+from cosmic.autonomy.bending.result import COMMON_SOURCES, Floats, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
 
 DEPTHS: Final = 36
@@ -464,6 +464,8 @@ class Posterior:
     probability : float
         That readings miss the best model by more than they do.
     weights : ndarray, shape (depths, variations), float64
+    excess : float
+        By how much the variance was taken to be more, as readings scatter more than foreseen.
     """
 
     log_ei: float
@@ -474,6 +476,7 @@ class Posterior:
     variation: float
     probability: float
     weights: Floats
+    excess: float = 1.0
 
 
 def excess_of(evidence: Evidence) -> float:
@@ -510,6 +513,7 @@ def posterior_of(evidence: Evidence, prior: Floats) -> Posterior:
         variation=float(weights.sum(axis=0) @ variation),
         probability=probability,
         weights=weights,
+        excess=excess,
     )
 
 
@@ -525,77 +529,3 @@ def _quantile(weights: Floats, means: Floats, stds: Floats, part: float) -> floa
     if not low < high or not (np.isfinite(weights).all() and np.isfinite(stds).all()):
         return 0.5 * (low + high)
     return float(brentq(more, low, high, xtol=EXACT, rtol=EXACT, maxiter=MOST_TRIES))
-
-
-def budget_of(
-    readings: Readings,
-    common: Common,
-    settings: FitSettings,
-    posterior: Posterior,
-    evidence: Evidence,
-) -> tuple[Contribution, ...]:
-    """Return the contributions to the variance of ln(EI), the largest first.
-
-    With depth and variation at their means ln(EI) is a weighted sum of the readings; the weights
-    are the sensitivities. What the depth adds is the spread of ln(EI) over its weights.
-    """
-    span, variation = readings.span, posterior.variation
-    nearest = int(np.abs(evidence.depths_um - posterior.depth_um).argmin())
-    varied = varied_covariance(readings, settings)[nearest] * variation**2
-    whole = fixed_covariance(readings, common) + varied
-    each = np.linalg.solve(whole, np.ones(len(span)))
-    weights = each / each.sum()
-    by = weights @ readings.to_common
-    lines = [
-        _line("readings", Kind.A, 1.0, "", _root(weights, readings.noise)),
-        _line(
-            "places of contact",
-            Kind.A,
-            settings.contact_std_um,
-            "um",
-            _root(weights, readings.repeat),
-        ),
-        _line(
-            "friction on a section askew",
-            Kind.B,
-            _typical_std(weights, readings.askew),
-            "",
-            _root(weights, readings.askew),
-        ),
-        _line("stiffness along the fibre", Kind.B, variation, "", _root(weights, varied)),
-    ]
-    stds = np.sqrt(np.diag(common.covariance))
-    units = ("", "", "", "um/uN", "um", "", "", "")
-    for number, (name, unit) in enumerate(zip(COMMON_SOURCES, units, strict=True)):
-        # What goes together is shared among both by its covariance.
-        part = float(by[number] * (common.covariance[number] @ by))
-        lines.append((name, Kind.B, float(stds[number]), unit, float(by[number]), max(part, 0.0)))
-    for name, unit, column, _, std in readings.own:
-        slope = float(weights @ column)
-        lines.append((name, Kind.B, std, unit, slope, (slope * std) ** 2))
-    of_depth = posterior.weights.sum(axis=1)
-    at_depth = (posterior.weights * evidence.log_ei).sum(axis=1) / np.maximum(of_depth, 1e-12)
-    mean = float(of_depth @ at_depth)
-    clamp = float(of_depth @ (at_depth - mean) ** 2)
-    slope = math.sqrt(clamp) / max(posterior.depth_std_um, 1e-9)
-    lines.append(("depth of the clamp", Kind.B, posterior.depth_std_um, "um", slope, clamp))
-    variance = sum(line[5] for line in lines) or 1.0
-    budget = [
-        Contribution(name, kind, std, unit, slope, part / variance)
-        for name, kind, std, unit, slope, part in lines
-    ]
-    return tuple(sorted(budget, key=lambda line: -line.share))
-
-
-def _typical_std(weights: Floats, covariance: Floats) -> float:
-    return math.sqrt(float(np.average(np.diag(covariance), weights=weights**2)))
-
-
-def _root(weights: Floats, covariance: Floats) -> float:
-    return math.sqrt(max(float(weights @ covariance @ weights), 0.0))
-
-
-def _line(
-    name: str, kind: Kind, std: float, unit: str, effect: float
-) -> tuple[str, Kind, float, str, float, float]:
-    return name, kind, std, unit, effect / std if std > 0.0 else 0.0, effect**2

@@ -105,11 +105,6 @@ def outcome_words(record: FibreRecord) -> str:
     return f"{record.outcome}: {record.cause}" if record.cause else str(record.outcome)
 
 
-def combined_std(result: BendingResult) -> float:
-    """Return the combined standard uncertainty of ln(EI) by the budget."""
-    return math.sqrt(sum((line.std * line.sensitivity) ** 2 for line in result.budget))
-
-
 def budget_rows(result: BendingResult) -> list[tuple[str, ...]]:
     """Return the budget of a stiffness as rows of text; contributions too small to see in one."""
     shown = [line for line in result.budget if line.share >= LEAST_SHARE]
@@ -117,7 +112,7 @@ def budget_rows(result: BendingResult) -> list[tuple[str, ...]]:
         (
             line.source,
             line.kind.value,
-            f"{number(line.std, 3)} {line.unit.replace('um', 'µm').replace('uN', 'µN')}".strip(),
+            f"{line.std:.3g} {line.unit.replace('um', 'µm').replace('uN', 'µN')}".strip(),
             f"{line.sensitivity:.3g}",
             f"{100.0 * line.share:.1f}",
         )

@@ -17,14 +17,13 @@ import numpy.typing as npt
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from cosmic.autonomy.bending.result import BendingResult
+from cosmic.autonomy.bending.result import BendingResult, combined_std_ln
 from cosmic.autonomy.bending.standards import ForceScale
 from cosmic.autonomy.campaign.analysis import scale_in
 from cosmic.autonomy.campaign.formatting import (
     EI_LABEL,
     NONE,
     budget_rows,
-    combined_std,
     duration,
     interval,
     length_words,
@@ -521,7 +520,7 @@ def _cards(data: ReportData, svg: ShowSvg, png: ShowPng) -> Iterator[_Card]:
             sha256=sha256,
             title=titles.get(record.number, f"Fibre {record.number}"),
             words=_standing(record),
-            combined=NONE if owns is None else number(combined_std(owns), 3),
+            combined=NONE if owns is None else f"{combined_std_ln(owns.budget):.2g}",
             figures=figures,
             span_rows=rows,
             budget_rows=budget,

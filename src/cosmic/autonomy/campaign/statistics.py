@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from scipy.special import stdtrit  # scipy.stats takes a second to load
 
-from cosmic.autonomy.bending.result import BendingResult
+from cosmic.autonomy.bending.result import BendingResult, combined_std_ln
 from cosmic.autonomy.campaign.records import FINISHED, FibreRecord, Outcome
 
 SECONDS_AN_HOUR: Final = 3600.0
@@ -127,11 +127,7 @@ def common_std_ln(results: Iterable[BendingResult]) -> float:
 
     It is the median of what the contributions of scale, drift and the like are in each.
     """
-    stds = [
-        math.sqrt(sum((line.std * line.sensitivity) ** 2 for line in each.budget if line.common))
-        for each in results
-        if each.budget
-    ]
+    stds = [combined_std_ln(each.budget, common=True) for each in results if each.budget]
     return float(np.median(stds)) if stds else 0.0
 
 

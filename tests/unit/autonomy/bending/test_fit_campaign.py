@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from cosmic.autonomy.bending.budget import NOT_TOGETHER
 from cosmic.autonomy.bending.fit import (
     Certificate,
     MeasuredFibre,
@@ -14,7 +15,7 @@ from cosmic.autonomy.bending.fit import (
     half_width_percent,
     measure_fibre,
 )
-from cosmic.autonomy.bending.result import Kind, Quality
+from cosmic.autonomy.bending.result import BendingResult, Kind, Quality, combined_std_ln
 from cosmic.autonomy.bending.settings import FitSettings
 from oracles.pushed_rod import pushed
 from oracles.sealed_session import STANDARD_EI, Fibre, Session, World, curves
@@ -30,6 +31,7 @@ WORLD = World(
     probe_side_un_um=10.0,
     relaxation=(0.01, 0.0),
 )
+SETTINGS = FitSettings()
 CERTIFICATE = Certificate(STANDARD_EI * SCALE, 0.02)
 
 
@@ -114,6 +116,33 @@ def test_the_budget_is_whole_and_says_which_way_each_line_is_known() -> None:
     assert scale.sensitivity == pytest.approx(1.0, abs=1e-6)
     half = math.log(found.ei_high_n_m2 / found.ei_low_n_m2) / 2.0 / 1.96
     assert scale.std * math.sqrt(1.0 / scale.share) == pytest.approx(half, rel=0.25)
+
+
+def std_ln(found: BendingResult) -> float:
+    return math.log(found.ei_high_n_m2 / found.ei_low_n_m2) / (2.0 * 1.96)
+
+
+def test_what_is_learned_together_counts_in_the_budget_as_it_does_in_the_interval() -> None:
+    session = Session(WORLD, np.random.default_rng(5))
+    standards = [measured(session, Fibre.standard(session), SETTINGS, CERTIFICATE).at(0.5)]
+    fibres = [measured(session, Fibre.drawn(session), SETTINGS).at(n / 2.0) for n in range(3)]
+    for found in fit_campaign(fibres, standards=standards, settings=SETTINGS):
+        whole = combined_std_ln(found.budget)
+        assert whole == pytest.approx(std_ln(found), rel=0.04)
+        shared = sum(line.share for line in found.budget if line.common)
+        assert combined_std_ln(found.budget, common=True) == pytest.approx(
+            whole * math.sqrt(shared)
+        )
+
+
+def test_the_budget_has_what_readings_that_do_not_lie_together_make_of_the_interval() -> None:
+    session = Session(WORLD, np.random.default_rng(2))
+    fibre = dataclasses.replace(Fibre.drawn(session), moves_in=1)
+    session.world = dataclasses.replace(WORLD, moved_um=60.0)
+    found = fit_bending(spans_of(session, fibre))
+    line = next(each for each in found.budget if each.source == NOT_TOGETHER)
+    assert line.share > 0.3
+    assert combined_std_ln(found.budget) == pytest.approx(std_ln(found), rel=0.1)
 
 
 def test_where_the_probe_touches_puts_right_what_the_image_has_wrong() -> None:

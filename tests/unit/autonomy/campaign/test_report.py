@@ -9,7 +9,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from cosmic.autonomy.campaign.formatting import length_words
+from cosmic.autonomy.bending.result import Contribution, Kind
+from cosmic.autonomy.campaign.formatting import budget_rows, length_words
 from cosmic.autonomy.campaign.records import (
     CERTAIN,
     CalibrationNote,
@@ -229,6 +230,14 @@ def test_the_table_keeps_how_probable_it_is_that_a_fibre_is_whole(tmp_path: Path
         record = good(store.begin_fibre(time_s=0.0))
         store.finish_fibre(replace(record, shape=replace(record.shape, probability=0.75)))
     assert read_campaign(tmp_path / "some")["probability"] == [0.75]
+
+
+def test_a_small_uncertainty_of_the_budget_keeps_its_digits() -> None:
+    result = good(1).bending
+    assert result is not None
+    line = Contribution("jaws and sensor give way", Kind.B, 4.37e-4, "um/uN", -3.2, 1.0)
+    ((_, _, told, _, _),) = budget_rows(replace(result, budget=(line,)))
+    assert told == "0.000437 µm/µN"
 
 
 def test_records_and_vision_call_the_same_fibres_certain():
