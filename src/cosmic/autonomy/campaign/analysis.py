@@ -1,9 +1,10 @@
 """The final values of a campaign, from its raw files alone: at its end, and when it is asked."""
 
 import hashlib
+import json
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from functools import cache
@@ -32,9 +33,12 @@ from cosmic.autonomy.campaign.records import (
 from cosmic.autonomy.campaign.storage_format import (
     FIBRES,
     FINAL,
+    Cell,
     RawFibre,
     fitted_file,
     read_raw,
+    result_row,
+    span_row,
 )
 from cosmic.autonomy.campaign.store import CampaignStore, write_whole
 from cosmic.autonomy.campaign.store_read import CampaignReader
@@ -46,6 +50,23 @@ from cosmic.frame.version import __version__
 
 SAME: Final = 1e-6
 """Of a value: what differs by less is the same number, rounded otherwise."""
+
+ROUNDING: Final = 1e-9
+"""Of what may be nothing: the same."""
+
+BESIDE: Final = (
+    "clamp_offset_um",
+    "clamp_offset_std_um",
+    "chi2",
+    "freedom",
+    "flags",
+    "reasons",
+    "used_spans",
+    "budget_json",
+    "scale_verified",
+    "notes",
+)
+"""Cells of a result beside its value and interval."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,6 +319,9 @@ class Comparison:
         By how much the sensor's scale is taken to be another one.
     missing : tuple of int
         Fibres with a value in the record and none in the raw files.
+    otherwise : tuple of str
+        What else the record has otherwise, in words: scale of the force, budgets, spans and the
+        like. Only what the same program made can be compared so closely.
     """
 
     compared: int
@@ -305,11 +329,12 @@ class Comparison:
     versions: tuple[str, ...]
     scale_percent: float
     missing: tuple[int, ...] = ()
+    otherwise: tuple[str, ...] = ()
 
     @property
     def same(self) -> bool:
         """Whether the record says what its raw files do."""
-        return not self.changed and not self.missing
+        return not (self.changed or self.missing or self.otherwise)
 
 
 def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
@@ -334,7 +359,51 @@ def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
         if record.bending is not None and number not in analysis.results
     )
     percent = 100.0 * (analysis.scale.off_part - off)
-    return Comparison(len(pairs), changed, versions, percent, missing)
+    otherwise = () if versions else tuple(_otherwise(pairs, changed, scale, analysis.scale))
+    return Comparison(len(pairs), changed, versions, percent, missing, otherwise)
+
+
+def _otherwise(
+    pairs: Sequence[tuple[FibreRecord, BendingResult]],
+    changed: Sequence[Change],
+    scale: ForceScale | None,
+    now: ForceScale,
+) -> Iterator[str]:
+    """Yield what beside values and intervals differs, in words."""
+    if scale is None or not _alike(asdict(scale), asdict(now)):
+        yield "the scale of the force"
+    told = {each.number for each in changed}
+    for record, result in pairs:
+        if record.number in told or record.bending is None:
+            continue
+        before, after = result_row(record.bending), result_row(result)
+        wrong = [name for name in BESIDE if not _alike(_parsed(before[name]), _parsed(after[name]))]
+        spans = zip(record.bending.spans, result.spans, strict=False)
+        if len(record.bending.spans) != len(result.spans) or not all(
+            _alike(span_row(one), span_row(other)) for one, other in spans
+        ):
+            wrong.append("spans")
+        if wrong:
+            yield f"fibre {record.number}: {', '.join(map(_in_words, wrong))}"
+
+
+def _parsed(value: Cell) -> object:
+    return json.loads(value) if isinstance(value, str) and value.startswith("[") else value
+
+
+def _in_words(name: str) -> str:
+    return name.removesuffix("_json").removesuffix("_um").replace("_", " ")
+
+
+def _alike(one: object, other: object) -> bool:
+    """Return whether two values, or trees of them, are the same but for rounding."""
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return one.keys() == other.keys() and all(_alike(one[key], other[key]) for key in one)
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        return len(one) == len(other) and all(map(_alike, one, other))
+    if isinstance(one, float) and isinstance(other, float):
+        return _same(one, other) or abs(one - other) < ROUNDING
+    return one == other
 
 
 def altered_files(reader: CampaignReader) -> tuple[str, ...]:

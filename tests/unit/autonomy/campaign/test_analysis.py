@@ -231,6 +231,39 @@ def test_a_value_that_no_raw_file_stands_for_is_named(
     assert "not in the raw files: fibre 2" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("change", "wanted"),
+    [
+        (
+            "campaign SET analysis_json = json_set(analysis_json, '$.scale.off_part', 0.04)",
+            "the scale of the force",
+        ),
+        (
+            "campaign SET analysis_json = json_set(analysis_json, '$.scale.standards[0].refused',"
+            " 'a beam that slipped')",
+            "the scale of the force",
+        ),
+        ("fibre SET scale_verified = 0 WHERE number = 3", "fibre 3: scale verified"),
+        ("fibre SET notes = 'friction' WHERE number = 2", "fibre 2: notes"),
+        (
+            "fibre SET budget_json = json_set(budget_json, '$[0].share', 0.01) WHERE number = 2",
+            "fibre 2: budget",
+        ),
+        ("span SET k_un_um = 2.0 * k_un_um WHERE fibre = 2 AND number = 1", "fibre 2: spans"),
+        ("fibre SET clamp_offset_um = 3.0 WHERE number = 2", "fibre 2: clamp offset"),
+    ],
+)
+def test_what_else_the_record_has_otherwise_is_named(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], change: str, wanted: str
+) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute(f"UPDATE {change}")
+    base.close()
+    assert main(["recompute", str(folder)]) == 3
+    assert f"otherwise in the record: {wanted}\n" in capsys.readouterr().out
+
+
 def test_another_version_of_the_analysis_is_named(campaign: Path, tmp_path: Path) -> None:
     folder = copied(campaign, tmp_path / "copy")
     with sqlite3.connect(folder / "campaign.sqlite") as base:
