@@ -220,7 +220,7 @@ def _width_um(raw: RawFibre, settings: AnalysisSettings) -> float:
 
 def _raw(reader: CampaignReader, *, check: bool) -> list[RawFibre]:
     found = []
-    for path, sha256 in reader.raw_files().values():
+    for number, (path, sha256) in reader.raw_files().items():
         if check and sha256:
             try:
                 now = hashlib.sha256(path.read_bytes()).hexdigest()
@@ -228,7 +228,12 @@ def _raw(reader: CampaignReader, *, check: bool) -> list[RawFibre]:
                 raise CampaignError(f"{path} cannot be read: {exc.strerror or exc}") from exc
             if now != sha256:
                 raise CampaignError(f"{path} is not as it was written: its SHA-256 differs")
-        found.append(read_raw(path))
+        raw = read_raw(path)
+        if raw.number != number:
+            raise CampaignError(
+                f"{path} is that of fibre {raw.number}, and the record has it for fibre {number}"
+            )
+        found.append(raw)
     return found
 
 
@@ -254,16 +259,25 @@ def finish(store: CampaignStore, settings: AnalysisSettings | None = None) -> An
 
 
 def scale_in(kept: Mapping[str, Any]) -> ForceScale | None:
-    """Return how the scale of the force is known by the analysis that is in a record."""
+    """Return how the scale of the force is known by the analysis that is in a record.
+
+    Raises
+    ------
+    CampaignError
+        It is not understood.
+    """
     if not kept:
         return None
     scale = dict(kept["scale"])
-    readings = tuple(
-        StandardReading(**{key: _number(value) for key, value in each.items()})
-        for each in scale.pop("standards")
-    )
-    reasons = tuple(scale.pop("reasons"))
-    return ForceScale(**scale, standards=readings, reasons=reasons)
+    try:
+        readings = tuple(
+            StandardReading(**{key: _number(value) for key, value in each.items()})
+            for each in scale.pop("standards")
+        )
+        reasons = tuple(scale.pop("reasons"))
+        return ForceScale(**scale, standards=readings, reasons=reasons)
+    except (AttributeError, KeyError, TypeError) as exc:
+        raise CampaignError(f"what the record says of the scale is not understood: {exc}") from exc
 
 
 def _finite(value: object) -> object:

@@ -8,7 +8,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -41,6 +41,9 @@ from cosmic.autonomy.campaign.storage_format import (
 )
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.renamed import Renamed
+
+ANALYSED: Final = ("fit", "standard", "scale")
+"""What is kept of an analysis."""
 
 
 @checked_class
@@ -79,21 +82,22 @@ class CampaignReader:
 
     def info(self) -> CampaignInfo:
         """Return what the campaign is."""
-        (row,) = self._rows("SELECT * FROM campaign")
-        return CampaignInfo(
-            name=str(row["name"]),
-            procedure=str(row["procedure"]),
-            sample=str(row["sample"]),
-            recipe_text=str(row["recipe_text"]),
-            started=str(row["started"]),
-            description=str(row["description"]),
-            operator=str(row["operator"]),
-            hardware=str(row["hardware"]),
-            seed=int(number(row["seed"])),
-            rate=number(row["rate"]),
-            versions=json.loads(str(row["versions_json"])),
-            world=str(row.get("world", "")),
-        )
+        with self._understood():
+            (row,) = self._rows("SELECT * FROM campaign")
+            return CampaignInfo(
+                name=str(row["name"]),
+                procedure=str(row["procedure"]),
+                sample=str(row["sample"]),
+                recipe_text=str(row["recipe_text"]),
+                started=str(row["started"]),
+                description=str(row["description"]),
+                operator=str(row["operator"]),
+                hardware=str(row["hardware"]),
+                seed=int(number(row["seed"])),
+                rate=number(row["rate"]),
+                versions=json.loads(str(row["versions_json"])),
+                world=str(row.get("world", "")),
+            )
 
     def ended(self) -> tuple[str, str]:
         """Return when the campaign ended last, ISO 8601, and why; both empty while it runs."""
@@ -139,16 +143,17 @@ class CampaignReader:
         """
         spans = self._by_fibre("SELECT * FROM span ORDER BY fibre, number")
         steps = self._by_fibre("SELECT * FROM operation ORDER BY fibre, number")
-        return tuple(
-            record
-            for row in self._rows("SELECT * FROM fibre ORDER BY number")
-            if (
-                record := fibre_record(
-                    row, spans.get(row["number"], []), steps.get(row["number"], [])
-                )
-            ).role
-            == role
-        )
+        with self._understood():
+            return tuple(
+                record
+                for row in self._rows("SELECT * FROM fibre ORDER BY number")
+                if (
+                    record := fibre_record(
+                        row, spans.get(row["number"], []), steps.get(row["number"], [])
+                    )
+                ).role
+                == role
+            )
 
     def sightings(self) -> tuple[Sighting, ...]:
         """Return what the first survey of each plate saw; empty where it was not kept."""
@@ -258,15 +263,16 @@ class CampaignReader:
             "SELECT *, EXISTS (SELECT 1 FROM fibre WHERE fibre.run = run.number) AS used"
             " FROM run ORDER BY number"
         )
-        return [
-            (
-                int(number(row["number"])),
-                str(row.get("record_sha256", "")),
-                bool(row["used"]),
-                "commit" in json.loads(str(row["versions_json"])),
-            )
-            for row in rows
-        ]
+        with self._understood():
+            return [
+                (
+                    int(number(row["number"])),
+                    str(row.get("record_sha256", "")),
+                    bool(row["used"]),
+                    "commit" in json.loads(str(row["versions_json"])),
+                )
+                for row in rows
+            ]
 
     def image_files(self) -> dict[str, str]:
         """Return the files of all images with their SHA-256."""
@@ -275,8 +281,12 @@ class CampaignReader:
 
     def analysis(self) -> dict[str, Any]:
         """Return what the final analysis was done with, and what it says; empty: there is none."""
-        (row,) = self._rows("SELECT * FROM campaign")
-        return dict(json.loads(str(row.get("analysis_json") or "{}")))
+        with self._understood():
+            (row,) = self._rows("SELECT * FROM campaign")
+            found = dict(json.loads(str(row.get("analysis_json") or "{}")))
+            if found and not all(isinstance(found.get(part), dict) for part in ANALYSED):
+                raise ValueError(f"an analysis without {', '.join(ANALYSED)}")
+            return found
 
     def finished(self) -> tuple[FibreRecord, ...]:
         """Return the fibres that have their end, without curves and images."""
@@ -295,7 +305,8 @@ class CampaignReader:
             raise CampaignError(f"{self.folder} has no fibre {fibre}")
         spans = self._rows("SELECT * FROM span WHERE fibre = ? ORDER BY number", fibre)
         steps = self._rows("SELECT * FROM operation WHERE fibre = ? ORDER BY number", fibre)
-        record = fibre_record(rows[0], spans, steps)
+        with self._understood():
+            record = fibre_record(rows[0], spans, steps)
         if not rows[0]["file"]:
             return record
         measured, fitted, series = read_curves(self.folder / str(rows[0]["file"]))
@@ -343,6 +354,17 @@ class CampaignReader:
         return tuple(_entry(row) for row in rows)
 
     # ------------------------------------------------------------------ inside
+
+    @contextmanager
+    def _understood(self) -> Generator[None]:
+        """Turn what is written otherwise than this program knows into words."""
+        try:
+            yield
+        except (KeyError, TypeError, ValueError) as exc:
+            raise CampaignError(
+                f"{self.folder / DATABASE} holds what this program does not know ({exc}): open it "
+                "with the program that wrote it, or take the folder from a copy"
+            ) from exc
 
     @contextmanager
     def _connection(self) -> Generator[sqlite3.Connection]:

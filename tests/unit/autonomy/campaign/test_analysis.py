@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import random
 import shutil
 import sqlite3
 from pathlib import Path
@@ -14,8 +15,10 @@ from cosmic.autonomy.campaign.provenance import Provenance, sha256_of, write_pro
 from cosmic.autonomy.campaign.records import STANDARD, CampaignError, Outcome, Shape
 from cosmic.autonomy.campaign.report import write_report
 from cosmic.autonomy.campaign.stop_rule import StandardSchedule
+from cosmic.autonomy.campaign.storage_format import read_raw
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.frame.errors import CosmicError
 from unit.autonomy.campaign.sample_records import INFO, good
 
 STANDARD_EI = 1.8e-10
@@ -262,6 +265,62 @@ def test_what_else_the_record_has_otherwise_is_named(
     base.close()
     assert main(["recompute", str(folder)]) == 3
     assert f"otherwise in the record: {wanted}\n" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "campaign SET analysis_json = '{\"fit\": '",
+        "campaign SET analysis_json = '[1]'",
+        "campaign SET analysis_json = '{\"fit\": {}}'",
+        "campaign SET analysis_json = json_set(analysis_json, '$.scale.new', 1)",
+        "fibre SET flags = 'of a later program' WHERE number = 2",
+        "fibre SET outcome = 'of a later program' WHERE number = 2",
+        "fibre SET budget_json = '[{}]' WHERE number = 2",
+        "span SET flags = 'of a later program' WHERE fibre = 3",
+        "run SET versions_json = 'x'",
+    ],
+)
+def test_what_a_record_holds_that_is_not_understood_is_said_in_words(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], change: str
+) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute(f"UPDATE {change}")
+    base.close()
+    assert main(["recompute", str(folder)]) == 1
+    said = capsys.readouterr().err
+    assert "does not know" in said or "not understood" in said
+
+
+def test_a_raw_file_of_an_older_program_that_is_another_fibres_is_refused(
+    campaign: Path, tmp_path: Path
+) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute("UPDATE fibre SET file_sha256 = ''")
+    base.close()
+    shutil.copy(folder / "fibres" / "00003.h5", folder / "fibres" / "00002.h5")
+    with pytest.raises(CampaignError, match=r"00002\.h5 is that of fibre 3, and the record"):
+        analyse(CampaignReader(folder))
+
+
+def test_a_raw_file_of_which_a_part_is_spoilt_costs_no_traceback(
+    campaign: Path, tmp_path: Path
+) -> None:
+    file, chance = tmp_path / "spoilt.h5", random.Random(3)
+    whole = (campaign / "fibres" / "00002.h5").read_bytes()
+    refused = 0
+    for _ in range(150):
+        content = bytearray(whole)
+        for _ in range(12):
+            content[chance.randrange(len(content))] = chance.randrange(256)
+        file.write_bytes(content)
+        try:
+            read_raw(file)
+        except CosmicError:
+            refused += 1
+    assert refused
 
 
 def test_another_version_of_the_analysis_is_named(campaign: Path, tmp_path: Path) -> None:
