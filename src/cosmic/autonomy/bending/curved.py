@@ -24,6 +24,9 @@ DIRECTION_UM: Final = 40.0
 MET_ENOUGH_PART: Final = 1e-3
 """Of the lever: where the contact stays farther from the probe, the fibre slides off."""
 
+LEAST_SQUARE: Final = 0.2
+"""Of what friction leaves of a push: with less the fibre is hardly pushed at all."""
+
 Mask = npt.NDArray[np.bool_]
 
 
@@ -127,6 +130,35 @@ class NaturalShape:
         first, second = arms[:-1], arms[1:]
         return float(((first * first + first * second + second * second) * np.diff(along)).sum())
 
+    def by_friction_both(
+        self, friction: float, *, depth_um: float, turned_rad: float = 0.0
+    ) -> float:
+        """Return how ln(k) changes with friction on the way out and back alike.
+
+        With a friction f, 1/k grows as the integral of a (a + f c) / (1 - f tan b), a and c the
+        arms of normal force and friction over cos b; f has the opposite sign on the way back, and
+        the mean of both is no straight line of it.
+
+        Parameters
+        ----------
+        turned_rad : float
+            By how much the push has turned the fibre away at the contact.
+        """
+        along, _ = self._arms
+        slope = math.tan(self.slope_rad - turned_rad)
+        x, y = self._places(along)
+        arms = (x[-1] - x) + (y[-1] - y) * slope
+        rubbed = (x[-1] - x) * slope - (y[-1] - y)
+        # Between the jaws the fibre is straight.
+        along = np.append(-depth_um, along)
+        arms = np.append(arms[0] + depth_um, arms)
+        rubbed = np.append(rubbed[0] + depth_um * slope, rubbed)
+        ratio = _integral(along, arms, rubbed) / _integral(along, arms, arms)
+        return sum(
+            sign * friction * part**2 / max(1.0 - (friction * part) ** 2, LEAST_SQUARE)
+            for sign, part in ((-1.0, slope), (1.0, ratio))
+        )
+
     @cached_property
     def _arms(self) -> tuple[Floats, Floats]:
         end = self._arc_at(self.at_um)
@@ -208,6 +240,13 @@ class NaturalShape:
     def _chords(self, along: Floats) -> npt.NDArray[np.complex128]:
         before, after = self._places(along - DIRECTION_UM), self._places(along + DIRECTION_UM)
         return np.asarray((after[0] - before[0]) + 1j * (after[1] - before[1]))
+
+
+def _integral(along: Floats, one: Floats, other: Floats) -> float:
+    """Return the integral of a product of two that are straight between places."""
+    mixed = 2.0 * (one[:-1] * other[:-1] + one[1:] * other[1:])
+    mixed += one[:-1] * other[1:] + one[1:] * other[:-1]
+    return float((mixed * np.diff(along)).sum()) / 6.0
 
 
 OutAndBack = tuple[PushedCurve, PushedCurve]

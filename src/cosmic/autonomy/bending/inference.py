@@ -186,6 +186,7 @@ def readings_of(
     k = np.array([each.k_un_um for each in rows])
     sign = np.array([each.sign for each in rows])
     friction = np.array([fits[n].by_friction for n in span]) * sign
+    friction += np.array([fits[n].by_friction_both for n in span])
     contact = response.by_contact[span]
     glass = certified is not None
     softer, by_shear, shear = _sheared(response.by_square[span], settings, glass=glass)

@@ -142,6 +142,8 @@ class SpanFit:
         Standard deviations of ln(k) on the way out and back, and how they go together.
     by_friction : float
         Change of ln(k) on the way out for a friction of 1; that of the way back is the opposite.
+    by_friction_both : float
+        Change of ln(k) on both ways for a friction of 1, beside that.
     by_side_out, by_side_back : float
         Change of ln(k) by all that the probe is taken to give way along the fibre.
     shift_um, shift_std_um : float
@@ -172,6 +174,7 @@ class SpanFit:
     back_std_part: float = math.nan
     branches_correlation: float = 0.0
     by_friction: float = 0.0
+    by_friction_both: float = 0.0
     by_side_out: float = 0.0
     by_side_back: float = 0.0
     shift_um: float = math.nan

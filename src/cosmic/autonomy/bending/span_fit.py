@@ -49,6 +49,9 @@ BASELINE_STDS: Final = (1000.0, 10.0)
 TYPICAL_PART: Final = 0.6
 """Of the stroke: where curves are compared."""
 
+TURNS_BY: Final = 1.5
+"""So much a cantilever turns at its end, rad, for a deflection as a part of its length."""
+
 TURNING_PART: Final = 0.1
 SLIPPED_PART: Final = 0.03
 """Of stroke and highest force: less does no harm."""
@@ -133,6 +136,7 @@ class _Model:
             max(float(np.max(points.probe_um)) - pushed.first.hinge_um, 0.0) / self.length_um
         )
         self.curves, self.stiff_probe = curves
+        self._shape = pushed.shape
         self._elapsed_s = points.time_s - points.time_s[0]
         self._lost, self.others = lost(points.time_s), others
         self._lost_of_others_un = others.lost_un(points.time_s)
@@ -193,6 +197,14 @@ class _Model:
         out, back = (self._typical(each) for each in self.curves)
         rub = self._friction
         return 0.5 * math.log(out / back) / rub if rub > 0.0 else 0.0
+
+    def by_friction_both(self) -> float:
+        """Return how ln(k) changes with friction on the way out and back alike."""
+        return self._shape.by_friction_both(
+            self._friction,
+            depth_um=self._settings.offset_um,
+            turned_rad=TURNS_BY * TYPICAL_PART * self.stroke_part,
+        )
 
     def by_side(self) -> tuple[float, float]:
         """Return how ln(k) of the ways out and back changes with what the probe gives way aside.
@@ -452,6 +464,7 @@ def _span_result(
         back_std_part=float(stds[2]) if both else math.nan,
         branches_correlation=float(covariance[0, 2] / (stds[0] * stds[2])) if both else 0.0,
         by_friction=model.by_friction(),
+        by_friction_both=model.by_friction_both(),
         by_side_out=model.by_side()[0],
         by_side_back=model.by_side()[1],
         shift_um=float(back[1] - out[1]),

@@ -56,6 +56,24 @@ def test_the_curve_of_a_curled_fibre_agrees_with_a_chain_of_least_energy(
     assert force == pytest.approx(chain, rel=5e-3)
 
 
+@pytest.mark.parametrize("turn_deg", [-70.0, -45.0, 45.0, 70.0])
+def test_friction_makes_a_curled_fibre_softer_on_the_way_out_and_back_alike(
+    turn_deg: float,
+) -> None:
+    shape, pushed_part, friction = shape_at(turn_deg, 600.0), 0.06, 0.4
+
+    def both(rub: float) -> float:
+        curves = shape.curves(depth_um=20.0, radius_um=25.0, friction=rub)
+        typical = [np.interp(pushed_part, each.deflection, each.pushed) for each in curves]
+        return float(np.log(typical).mean())
+
+    slope = (both(friction + 0.05) - both(friction - 0.05)) / 0.1
+    turned = 1.5 * pushed_part
+    said = shape.by_friction_both(friction, depth_um=20.0, turned_rad=turned)
+    assert said == pytest.approx(slope, rel=0.2, abs=0.01)
+    assert said < 0.0
+
+
 def test_fibres_laid_out_together_bend_as_each_by_itself() -> None:
     shapes = [shape_at(turn_deg, 450.0) for turn_deg in (-60.0, 0.0, 25.0)]
     bent = {"depth_um": 20.0, "radius_um": 25.0, "friction": 0.3}

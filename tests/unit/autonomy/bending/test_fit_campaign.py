@@ -145,6 +145,16 @@ def test_the_budget_has_what_readings_that_do_not_lie_together_make_of_the_inter
     assert combined_std_ln(found.budget) == pytest.approx(std_ln(found), rel=0.1)
 
 
+@pytest.mark.parametrize("turn_deg", [-75.0, -60.0])
+def test_how_friction_softens_a_curled_fibre_on_both_ways_is_in_its_interval(
+    turn_deg: float,
+) -> None:
+    session = Session(dataclasses.replace(WORLD, friction=(0.5, 0.5)), np.random.default_rng(2))
+    fibre = dataclasses.replace(Fibre.drawn(session), turn_deg=turn_deg)
+    found = fit_bending(spans_of(session, fibre))
+    assert found.ei_low_n_m2 < fibre.true_ei(600.0) * SCALE < found.ei_high_n_m2
+
+
 def test_where_the_probe_touches_puts_right_what_the_image_has_wrong() -> None:
     world = dataclasses.replace(WORLD, arc_deg=(40.0, 0.0))
     session = Session(world, np.random.default_rng(3))
