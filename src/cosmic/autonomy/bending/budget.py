@@ -40,7 +40,7 @@ def budget_of(
     weights = each / each.sum()
     by = weights @ readings.to_common
     lines = [
-        _line("readings", Kind.A, 1.0, "", _root(weights, readings.noise)),
+        _line("readings", Kind.A, by_noise := _root(weights, readings.noise), "", by_noise),
         _line(
             "places of contact",
             Kind.A,

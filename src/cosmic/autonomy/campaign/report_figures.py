@@ -19,6 +19,8 @@ FEW: Final = 8
 """Fewer fibres are drawn one by one."""
 BEFORE_PART: Final = 0.3
 """How much of a push before contact is drawn, of the longest push after it."""
+APART_PART: Final = 0.07
+"""Of the forces: how far labels stand from each other, and from the upper end."""
 SHORTEST_S: Final = 0.05
 """Of an operation that is drawn."""
 
@@ -65,11 +67,15 @@ def force_figure(record: FibreRecord) -> str:
     forces = np.concatenate([each.force_un for each in curves])
     first = max(float(probes.min()), -BEFORE_PART * max(float(probes.max()), 1.0))
     x = Axis("push beyond the first contact, µm", *around(first, float(probes.max())))
-    y = Axis("force, µN", *around(float(forces.min()), float(forces.max())))
+    low, high = around(float(forces.min()), float(forces.max()))
+    labels = _apart(curves, APART_PART * (high - low))
+    # The labels of pushes that end at about the same force stand above each other.
+    above = max(at_un for _, at_un, _ in labels) + APART_PART * (high - low)
+    y = Axis("force, µN", low, max(high, above))
     plot = Plot(x, y, f"Force over push of fibre {record.number}")
     for curve in curves:
         _draw(plot, curve, first)
-    for at_um, at_un, words in _apart(curves, 0.06 * (y.high - y.low)):
+    for at_um, at_un, words in labels:
         plot.note(at_um, at_un, words, end=True)
     return plot.svg()
 

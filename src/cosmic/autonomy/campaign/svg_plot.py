@@ -15,6 +15,8 @@ LEFT, RIGHT, TOP, BOTTOM = 58.0, 14.0, 12.0, 44.0
 TEXT: Final = 11
 LETTER: Final = 6.0
 """Width of a letter, more or less."""
+AMOUNT, SHORTEST_BAR = 70.0, 60.0
+"""Room for an amount beside its bar, and for the longest bar whatever its name."""
 STEPS: Final = (1.0, 2.0, 5.0, 10.0)
 LOG_PARTS: Final = (
     (0.4, (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8)),
@@ -166,11 +168,13 @@ def bars(title: str, rows: Sequence[tuple[str, float, str]], *, width: float = 4
     """Return lying bars: what, how much, and how much in words."""
     height = 24.0 * len(rows) + 8.0
     most = max((amount for _, amount, _ in rows), default=1.0) or 1.0
+    letters = int((width - AMOUNT - SHORTEST_BAR - 16.0) / LETTER)
+    rows = [(_shortened(name, letters), amount, words) for name, amount, words in rows]
     begin = LETTER * max((len(name) for name, _, _ in rows), default=0) + 16.0
     parts = []
     for number, (name, amount, amount_text) in enumerate(rows):
         top = 24.0 * number + 6.0
-        long = max(amount / most * (width - begin - 70.0), 1.0)
+        long = max(amount / most * (width - begin - AMOUNT), 1.0)
         parts.append(_text(begin - 8.0, top + 13.0, name, anchor="end"))
         parts.append(
             f'<rect x="{begin:.1f}" y="{top:.1f}" width="{long:.1f}" height="17" fill="{BLUE}"/>'
@@ -182,6 +186,10 @@ def bars(title: str, rows: Sequence[tuple[str, float, str]], *, width: float = 4
         f'font-family="sans-serif" font-size="{TEXT}">'
         f'<rect width="{width:g}" height="{height:g}" fill="#ffffff"/>{"".join(parts)}</svg>'
     )
+
+
+def _shortened(text: str, letters: int) -> str:
+    return text if len(text) <= letters else f"{text[: letters - 1].rstrip()}…"
 
 
 def around(low: float, high: float, part: float = 0.06) -> tuple[float, float]:

@@ -1,5 +1,6 @@
 """The report of a campaign: one page that says everything, and a table."""
 
+import itertools
 import math
 import re
 import xml.etree.ElementTree as ET
@@ -19,10 +20,11 @@ from cosmic.autonomy.campaign.records import (
     Shape,
 )
 from cosmic.autonomy.campaign.report import write_report
+from cosmic.autonomy.campaign.report_figures import force_figure
 from cosmic.autonomy.campaign.report_table import COLUMNS, read_campaign, write_table
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
-from cosmic.autonomy.campaign.svg_plot import Axis
+from cosmic.autonomy.campaign.svg_plot import Axis, bars
 from cosmic.vico.core.vision import certainty
 from unit.autonomy.campaign.sample_records import INFO, failed, good
 
@@ -238,6 +240,33 @@ def test_a_small_uncertainty_of_the_budget_keeps_its_digits() -> None:
     line = Contribution("jaws and sensor give way", Kind.B, 4.37e-4, "um/uN", -3.2, 1.0)
     ((_, _, told, _, _),) = budget_rows(replace(result, budget=(line,)))
     assert told == "0.000437 µm/µN"
+
+
+def texts_of(svg: str) -> list[tuple[float, float, float, str]]:
+    """Return left and right end, height and words of each text that is not turned."""
+    found = []
+    for each in ET.fromstring(svg).iter("{http://www.w3.org/2000/svg}text"):
+        words, anchor = each.text or "", each.get("text-anchor")
+        long = 6.0 * len(words)
+        if each.get("transform") is None:
+            left = float(each.get("x", 0)) - {"end": long, "middle": long / 2.0}.get(anchor, 0.0)
+            found.append((left, left + long, float(each.get("y", 0)), words))
+    return found
+
+
+def test_labels_of_pushes_that_end_at_one_force_stay_on_the_figure() -> None:
+    texts = texts_of(force_figure(good(1, ei_n_m2=1.8e-10, seed=5)))
+    heights = sorted(height for _, _, height, words in texts if re.fullmatch(r"\d+ µm", words))
+    assert len(heights) == 5
+    assert heights[0] >= 11.0
+    assert min(b - a for a, b in itertools.pairwise(heights)) > 9.0
+
+
+def test_a_cause_that_is_longer_than_the_figure_is_shortened() -> None:
+    causes = [("the fibre stuck to the plate and came off the jaws as they rose again", 3.0, "3")]
+    texts = texts_of(bars("Failures by cause", [*causes, ("no contact", 1.0, "1")]))
+    assert texts[0][3].endswith("…")
+    assert all(left >= 0.0 and right <= 430.0 for left, right, _, _ in texts)
 
 
 def test_records_and_vision_call_the_same_fibres_certain():
