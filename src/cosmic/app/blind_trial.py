@@ -10,7 +10,8 @@ import json
 import math
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, Self
@@ -37,6 +38,8 @@ WORLDS: Final = ("friendly", "realistic", "harsh")
 STANDARD: Final = -1
 STEEPEST_DEG: Final = 40.0
 TWICE: Final = 2.0
+COLUMNS: Final = ("way_um", "force_un", "force_std_un", "time_s", "loading")
+"""Of a push."""
 
 
 class TrialError(CosmicError):
@@ -105,6 +108,8 @@ class TrialResult:
         How the scale of the force was known.
     exit_code : int
         How a whole campaign ended, as `cosmic campaign` says it; 0: as was asked.
+    secret : str
+        With which the same session can be had again; empty where a file has it.
     """
 
     seal: str
@@ -112,6 +117,7 @@ class TrialResult:
     rows: tuple[TrialRow, ...]
     scale: str = ""
     exit_code: int = 0
+    secret: str = ""
 
 
 def sealed_program() -> Path:
@@ -167,14 +173,18 @@ class SealedSession:
             asked["seed"] = secret
         try:
             head = self._ask(asked)
+            with self._understood(head):
+                self.seal = str(head["seal"])
+                ei, part = float(head["standard_ei_n_m2"]), float(head["standard_expanded_part"])
+                self.settings = FitSettings(range_un=float(head["range_un"]), **UNSEEN)
+            if not (0.0 < ei < math.inf and 0.0 <= part < 1.0):
+                raise TrialError(
+                    f"{self._program}: a standard of {ei:g} N m2 within {part:g} of it is none"
+                )
+            self.certificate = Certificate(ei, part)
         except BaseException:
             self.close()
             raise
-        self.seal = str(head["seal"])
-        self.certificate = Certificate(
-            float(head["standard_ei_n_m2"]), float(head["standard_expanded_part"])
-        )
-        self.settings = FitSettings(range_un=float(head["range_un"]), **UNSEEN)
 
     def __enter__(self) -> Self:
         return self
@@ -190,16 +200,20 @@ class SealedSession:
 
     def measure(self, number: int, part: float) -> MeasuredFibre | None:
         """Bend a fibre, or the standard, at spans planned as they come; None: too short."""
-        line = np.array(self._ask({"take": number, "part": part})["line_um"], dtype=np.float64)
-        rising = np.diff(line[:, 0]) > 0.0
-        line = line[: len(line) if rising.all() else int(rising.argmin()) + 1]
+        shown = self._ask({"take": number, "part": part})
+        with self._understood(shown):
+            line = np.array(shown["line_um"], dtype=np.float64)
+            rising = np.diff(line[:, 0]) > 0.0
+            line = line[: len(line) if rising.all() else int(rising.argmin()) + 1]
+            free = _gentle_um(line)
         spans: list[Span] = []
-        free, guess = _gentle_um(line), DRY_EI_N_M2
+        guess = DRY_EI_N_M2
         try:
             while plan := plan_spans(free, guess, done=spans, settings=self.settings):
                 one = plan[0]
                 read = self._ask({"push": [one.span_um, one.stroke_um]})
-                spans.append(_span(read, line, one.span_um))
+                with self._understood(read):
+                    spans.append(_span(read, line, one.span_um))
                 if len(spans) == 1:
                     guess = guess_ei(spans, settings=self.settings) or guess
         except BendingError:
@@ -216,9 +230,23 @@ class SealedSession:
             The secret is not the one whose hash was given away at the begin.
         """
         truth = self._ask({"frozen": frozen})
-        if hashlib.sha256(str(truth["seed"]).encode()).hexdigest() != self.seal:
+        with self._understood(truth):
+            truth["ei_n_m2"] = [math.nan if e is None else float(e) for e in truth["ei_n_m2"]]
+            truth["seed"] = str(truth["seed"])
+        if hashlib.sha256(truth["seed"].encode()).hexdigest() != self.seal:
             raise TrialError("the seal is broken: the secret is not the one of the begin")
         return truth
+
+    @contextmanager
+    def _understood(self, answer: dict[str, Any]) -> Generator[None]:
+        """Turn an answer that is otherwise than it should be into words."""
+        try:
+            yield
+        except (KeyError, IndexError, TypeError, ValueError) as exc:
+            raise TrialError(
+                f"{self._program}: the sealed session answers otherwise than it should "
+                f"({type(exc).__name__}: {exc}): {json.dumps(answer)[:80]}"
+            ) from exc
 
     def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
         given, taken = self._process.stdin, self._process.stdout
@@ -252,6 +280,8 @@ def _gentle_um(line_um: Floats) -> float:
 
 
 def _span(read: dict[str, Any], line: Floats, place_um: float) -> Span:
+    if len({len(read[column]) for column in COLUMNS}) > 1:
+        raise ValueError(f"{', '.join(COLUMNS)} differ in length")
     return Span(
         nominal_um=place_um,
         probe_x_um=place_um,
@@ -272,6 +302,7 @@ def run_session(
     program: Path | None = None,
     standard: bool = True,
     secret: int | None = None,
+    told: Callable[[str], object] = str,
 ) -> TrialResult:
     """Measure in a sealed session, freeze the analysis, open the seal.
 
@@ -279,6 +310,9 @@ def run_session(
     ----------
     standard : bool
         The standard is bent at the begin, in the middle and at the end.
+    told : callable
+        Called with the seal before anything is measured, and with the hash of the analysis before
+        the truth is asked for.
 
     Raises
     ------
@@ -286,6 +320,7 @@ def run_session(
         The session does not answer, or its seal is broken.
     """
     with SealedSession(program or sealed_program(), world, fibres, secret=secret) as session:
+        told(f"sealed: {session.seal}")
         kept: dict[int, MeasuredFibre] = {}
         standards = []
         for number in range(fibres):
@@ -301,11 +336,19 @@ def run_session(
         )
         final = [Measured.of(n, each) for n, each in zip(kept, found.fibres, strict=True)]
         frozen = digest_of(final)
-        truth = session.open(frozen)["ei_n_m2"]
-        rows = tuple(TrialRow(each, float(truth[each.number])) for each in final)
+        told(f"frozen: {frozen}")
+        opened = session.open(frozen)
+        truth = opened["ei_n_m2"]
+        if len(truth) != fibres:
+            raise TrialError(f"the sealed session tells {len(truth)} truths of {fibres} fibres")
+        rows = tuple(TrialRow(each, truth[each.number]) for each in final)
         said = "verified" if found.scale.verified else "not verified"
         return TrialResult(
-            session.seal, frozen, rows, f"{said}, {100.0 * found.scale.off_part:+.1f} %"
+            session.seal,
+            frozen,
+            rows,
+            f"{said}, {100.0 * found.scale.off_part:+.1f} %",
+            secret=opened["seed"],
         )
 
 
@@ -317,7 +360,11 @@ def digest_of(measured: Sequence[Measured]) -> str:
 
 def table_of(results: Sequence[TrialResult]) -> list[str]:
     """Return the table of a trial: each fibre of a single session, and what all come to."""
-    lines = [f"seal {each.seal}, analysis frozen as {each.frozen}" for each in results]
+    lines = [
+        f"seal {each.seal}, analysis frozen as {each.frozen}"
+        + (f", secret {each.secret}" if each.secret else "")
+        for each in results
+    ]
     rows = [row for each in results for row in each.rows]
     if len(results) == 1:
         lines.append(f"scale of the force: {results[0].scale}")

@@ -49,6 +49,56 @@ def test_a_session_is_measured_frozen_and_opened() -> None:
     assert all(abs(row.error_percent) < 25.0 for row in found.rows)
 
 
+def test_seal_and_hash_of_the_analysis_are_told_before_what_they_are_of() -> None:
+    said: list[str] = []
+    found = run_session("friendly", 1, secret=5, told=said.append)
+    assert said == [f"sealed: {found.seal}", f"frozen: {found.frozen}"]
+    assert hashlib.sha256(found.secret.encode()).hexdigest() == found.seal
+    assert f"secret {found.secret}" in table_of([found])[0]
+    again = run_session("friendly", 1, secret=int(found.secret))
+    assert again.rows[0].true_n_m2 == found.rows[0].true_n_m2
+
+
+HEAD = {"seal": "x", "standard_ei_n_m2": 6e-11, "standard_expanded_part": 0.02, "range_un": 180}
+LINE = {"line_um": [[0.0, 0.0], [500.0, 0.0], [1000.0, 0.0]]}
+
+
+@pytest.mark.parametrize(
+    "answers",
+    [
+        [{}],
+        [HEAD | {"range_un": "many"}],
+        [HEAD | {"standard_ei_n_m2": 0.0}],
+        [HEAD, {}],
+        [HEAD, {"line_um": [1.0]}],
+        [HEAD, {"line_um": []}],
+        [HEAD, LINE, {}],
+        [HEAD, LINE, {name: [1.0] for name in ("way_um", "force_un", "time_s", "loading")}],
+        [
+            HEAD,
+            LINE,
+            {"way_um": [1, 2], "force_un": [1], "force_std_un": [1], "time_s": [1], "loading": [1]},
+        ],
+    ],
+)
+def test_a_session_that_answers_otherwise_than_it_should_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], answers: list[dict[str, object]]
+) -> None:
+    program = tmp_path / "other.py"
+    program.write_text(
+        "import json, sys\n"
+        f"for each in {answers!r}:\n"
+        "    sys.stdin.readline()\n"
+        "    print(json.dumps(each), flush=True)\n"
+        "sys.stdin.readline()\n",
+        encoding="utf-8",
+    )
+    assert main(["blind-trial", "--sealed-by", str(program), "--fibres", "1"]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith(f"cosmic: {program}: ")
+    assert "otherwise than it should" in said or "is none" in said
+
+
 def test_two_sessions_of_no_secret_in_common_differ() -> None:
     seals = set()
     for _ in range(2):

@@ -6,6 +6,7 @@ import json
 import secrets
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import IO, Final
 
@@ -46,7 +47,7 @@ def run(chosen: argparse.Namespace) -> int:
     else:
         program = chosen.sealed_by or sealed_program()
         results = [
-            run_session(chosen.world, chosen.fibres, program=program)
+            run_session(chosen.world, chosen.fibres, program=program, told=_say)
             for _ in range(chosen.sessions)
         ]
     sys.stdout.write("\n".join(table_of(results)) + "\n")
@@ -70,8 +71,7 @@ def whole(recipe: Path, folder: Path | None, world: str) -> TrialResult:
     nonce = secrets.token_hex(16)
     seal = hashlib.sha256(f"{seed} {nonce}".encode()).hexdigest()
     (folder / SEALED).mkdir(parents=True)
-    sys.stdout.write(f"sealed: {seal}\n")
-    sys.stdout.flush()
+    _say(f"sealed: {seal}")
     campaign, truth = folder / "campaign", folder / SEALED / "truth.jsonl"
     command = [sys.executable, "-m", "cosmic", "campaign", str(recipe), "--out", str(campaign)]
     command += ["--seed", str(seed), "--world", world, "--truth", str(truth)]
@@ -90,7 +90,9 @@ def whole(recipe: Path, folder: Path | None, world: str) -> TrialResult:
         if number not in {each.number for each in reader.fibres(STANDARD)}
     ]
     frozen = digest_of(final)
-    (folder / FROZEN).write_text(json.dumps({"seal": seal, "analysis": frozen}), "utf-8")
+    page = {"seal": seal, "analysis": frozen, "measured": [asdict(each) for each in final]}
+    (folder / FROZEN).write_text(json.dumps(page), "utf-8")
+    _say(f"frozen: {frozen}")
     opened = {"seed": seed, "nonce": nonce}
     (folder / SEALED / "secret.json").write_text(json.dumps(opened), "utf-8")
     known, records = read_truth(truth), {each.number: each for each in reader.finished()}
@@ -104,6 +106,12 @@ def whole(recipe: Path, folder: Path | None, world: str) -> TrialResult:
     if code:
         sys.stderr.write(f"the campaign ended with exit code {code}: {said} says why\n")
     return TrialResult(seal, frozen, rows, words, code)
+
+
+def _say(line: str) -> None:
+    """Print a line at once: whoever reads along has it before what follows."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
 
 
 def _run_to_its_end(command: list[str], output: IO[bytes]) -> int:
