@@ -149,7 +149,12 @@ def fibres_needed(mean: MeanEi, precision_percent: float) -> float:
     half, shared = math.log1p(precision_percent / 100.0), TWO_SIDED * mean.common_std_ln
     if shared >= half:
         return math.inf
-    return math.ceil((TWO_SIDED * mean.spread_ln) ** 2 / (half**2 - shared**2))
+    room = math.sqrt(half**2 - shared**2)
+    needed = max(math.ceil((TWO_SIDED * mean.spread_ln / room) ** 2), 2)
+    # The fewer there are the less is known of their spread: as `mean_ei` counts it.
+    while float(stdtrit(needed - 1, CONFIDENCE)) * mean.spread_ln > room * math.sqrt(needed):
+        needed += 1
+    return needed
 
 
 def progress(fibres: Sequence[FibreRecord], elapsed_s: float, plates: int = 0) -> CampaignProgress:

@@ -48,6 +48,21 @@ def test_an_empty_campaign_has_no_rates() -> None:
     assert now.mean.count == 0
 
 
+@pytest.mark.parametrize("spread", [0.0, 0.02, 0.05, 0.2, 0.56])
+def test_as_many_fibres_as_are_planned_make_the_mean_as_precise_as_wanted(spread: float) -> None:
+    rng = np.random.default_rng(1)
+    found = replace(mean_ei([5e-11, 5e-11]), spread_ln=spread, common_std_ln=0.01)
+    needed = int(fibres_needed(found, 5.0))
+    for count, precise in ((needed, True), (needed - 1, False)):
+        if count < 2:
+            continue
+        logs = rng.standard_normal(count)
+        logs = spread * (logs - logs.mean()) / logs.std(ddof=1)
+        mean = mean_ei(5e-11 * np.exp(logs), common_std_ln=0.01)
+        half = math.log(mean.ei_high_n_m2 / mean.ei_n_m2)
+        assert (half <= math.log(1.05)) is precise
+
+
 def test_the_interval_of_the_mean_covers_the_median_of_the_pulp() -> None:
     rng, covered = np.random.default_rng(2), 0
     for _ in range(400):
