@@ -80,7 +80,7 @@ def points_of(span: Span) -> Points:
     Raises
     ------
     BendingError
-        The arrays differ in length, or too few points are left.
+        The arrays differ in length, times fall, or too few points are left.
     """
     count = len(span.probe_um)
     columns = (span.force_un, span.force_std_un, span.time_s, span.loading)
@@ -101,6 +101,11 @@ def points_of(span: Span) -> Points:
         raise BendingError(
             f"the span at {span.nominal_um:g} um has {np.sum(span.loading[kept])} points on the "
             f"way out, and a fit needs {LEAST_OUT}: measure it again with more steps"
+        )
+    if not (np.diff(span.time_s[kept]) >= 0.0).all():
+        raise BendingError(
+            f"the span at {span.nominal_um:g} um has times that fall: its points stand in the "
+            "order in which they were read"
         )
     for word, branch in (("out", kept & span.loading), ("back", kept & ~span.loading)):
         if branch.sum() > 1 and not np.ptp(span.probe_um[branch]) > 0.0:

@@ -78,6 +78,12 @@ def checked(
         flags.add(Quality.TOO_FEW_SPANS)
         reasons.append(f"{len(good)} good spans, and {LEAST_SPANS} are needed to find the clamp")
         flags |= {flag for fit in result.spans for flag in fit.flags & set(BAD)}
+    elif not _apart_um(result, good) > SIGMAS * settings.contact_std_um:
+        flags.add(Quality.TOO_FEW_SPANS)
+        reasons.append(
+            f"all good spans lie at {result.spans[good[0]].place_um:.0f} um, and two places are "
+            "needed to find the clamp"
+        )
     half = 50.0 * (result.ei_high_n_m2 - result.ei_low_n_m2) / result.ei_n_m2
     if not half <= settings.soft_percent:
         flags.add(Quality.TOO_SOFT)
@@ -100,6 +106,10 @@ def checked(
         reasons=tuple(reasons),
         notes=frozenset(notes - flags),
     )
+
+
+def _apart_um(result: BendingResult, good: Sequence[int]) -> float:
+    return float(np.ptp([result.spans[n].place_um for n in good]))
 
 
 def _spoilt(result: BendingResult) -> set[Quality]:

@@ -160,7 +160,8 @@ def _rough_ei(span: Span, settings: FitSettings) -> float | None:
         lever = span.shape.lever_um(settings.offset_um)
     else:
         lever = span.nominal_um + settings.offset_um
-    return k_un_um * lever**3 / 3.0 / UN_UM2_PER_N_M2
+    ei = k_un_um * lever**3 / 3.0 / UN_UM2_PER_N_M2
+    return ei if 0.0 < ei < math.inf else None
 
 
 def _spread(shortest: float, longest: float, count: int) -> list[float]:

@@ -162,6 +162,21 @@ def test_a_zero_that_wanders_makes_a_soft_fibre_less_certain() -> None:
 # ---------------------------------------------------------------------- few and soft
 
 
+def test_spans_at_one_place_find_no_clamp_however_many_there_are() -> None:
+    one = rig()
+    found = fit_bending([one.push(300.0, 12.0) for _ in range(4)])
+    assert not found.trusted
+    assert Quality.TOO_FEW_SPANS in found.flags
+    assert "all good spans lie at 300 um" in "".join(found.reasons)
+    assert fit_bending([one.push(place, 12.0) for place in (300.0, 340.0)]).trusted
+
+
+def test_points_that_were_not_handed_over_as_they_were_read_are_refused() -> None:
+    span = rig().push(300.0, 12.0)
+    with pytest.raises(BendingError, match="times that fall"):
+        fit_bending([dataclasses.replace(span, time_s=span.time_s[::-1])])
+
+
 def test_one_span_alone_has_a_wide_interval_and_is_not_trusted() -> None:
     covered = 0
     for seed in range(20):

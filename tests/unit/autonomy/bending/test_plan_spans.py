@@ -1,5 +1,8 @@
 """Where a fibre is pushed, and how far."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -71,6 +74,9 @@ def test_what_is_measured_is_not_planned_again_when_the_guess_gets_better() -> N
 
 def test_nothing_measured_gives_no_guess() -> None:
     assert guess_ei([]) is None
+    span = Rig(5e-11, np.random.default_rng(1)).push(300.0, 12.0)
+    for nowhere_um in (-300.0, math.nan):
+        assert guess_ei([replace(span, nominal_um=nowhere_um)]) is None
     assert guess_ei([Rig(1e-20, np.random.default_rng(1)).push(300.0, 12.0)]) is None
 
 
