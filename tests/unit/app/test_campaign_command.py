@@ -17,6 +17,7 @@ from cosmic.app.commands import campaign as campaign_command
 from cosmic.app.commands import chosen_rig
 from cosmic.app.commands import repair as repair_command
 from cosmic.autonomy.campaign.campaign import CampaignPhase
+from cosmic.autonomy.campaign.provenance import Provenance, write_provenance
 from cosmic.autonomy.campaign.records import CampaignInfo
 from cosmic.autonomy.campaign.statistics import progress
 from cosmic.autonomy.campaign.store import CampaignStore
@@ -167,6 +168,22 @@ def test_another_world_than_that_of_the_campaign_is_refused(
     assert CampaignReader(out).info().world == "friendly"
     assert main(["campaign", str(recipe), "--out", str(out), "--world", "harsh"]) == 1
     assert "Resume with --world friendly" in capsys.readouterr().err
+
+
+def test_forces_by_another_scale_do_not_go_into_one_campaign(
+    tmp_path: Path, qapp: object, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recipe, out = tmp_path / "bend.toml", tmp_path / "out"
+    recipe.write_text('procedure = "bend test"\n[stop]\ncount = 1\n', encoding="utf-8")
+    text = recipe.read_text(encoding="utf-8")
+    info = CampaignInfo("bend", "bend test", "three", text, "2026-11-21T12:00:00+00:00", seed=7)
+    CampaignStore.create(out, info).close()
+    scale = {"name": "FT-S540", "unit": "uN", "coefficients": [-250.0, 107.0]}
+    daqco = {"scale": [scale], "channel": [{"name": "force", "scale": "FT-S540"}]}
+    write_provenance(out, 1, Provenance(settings={"platform": {"daqco": daqco}}), text)
+    assert main(["campaign", str(recipe), "--out", str(out)]) == 1
+    said = capsys.readouterr().err
+    assert "has the scale uN [-250.0, 100.0] now, and had uN [-250.0, 107.0] in run 1" in said
 
 
 def test_the_log_of_a_campaign_is_kept_in_its_folder_and_warnings_are_reported_at_once(

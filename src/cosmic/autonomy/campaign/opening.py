@@ -6,10 +6,16 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from cosmic.autonomy.campaign.campaign import Campaign, Treatment
 from cosmic.autonomy.campaign.plates import CampaignPlates
-from cosmic.autonomy.campaign.provenance import Provenance, sha256_of, write_provenance
+from cosmic.autonomy.campaign.provenance import (
+    Provenance,
+    read_provenance,
+    sha256_of,
+    write_provenance,
+)
 from cosmic.autonomy.campaign.recipe import Recipe, asks_the_same, load_recipe
 from cosmic.autonomy.campaign.records import TWIN, CampaignError, CampaignInfo
 from cosmic.autonomy.campaign.resume import ResumePlan, resume
@@ -181,6 +187,7 @@ def _store(
         return CampaignStore.create(folder, _info(recipe, host), time_s=now_s), None
     # Before it is opened for writing: a run that was refused would count as one cut off.
     _check_same(CampaignReader(folder).info(), recipe, folder, host)
+    _check_force_scale(folder, recipe, host)
     store = CampaignStore.open(folder, time_s=now_s, versions=host.versions)
     try:
         return store, resume(store)
@@ -213,6 +220,35 @@ def _check_same(info: CampaignInfo, recipe: Recipe, folder: Path, host: Campaign
             f"{folder} holds a campaign in the {info.world} world of the twin, and this one is "
             f"{host.world}. Resume with --world {info.world}, or name another folder"
         )
+
+
+def _check_force_scale(folder: Path, recipe: Recipe, host: CampaignHost) -> None:
+    """See that a channel makes the same force of a voltage as when the campaign was begun."""
+    settings = recipe.parameters
+    if not (isinstance(settings, HandlingSettings) and PROCEDURES[recipe.file.procedure].measures):
+        return
+    channel = settings.push.channel
+    try:
+        runs = read_provenance(folder)
+    except CampaignError:  # `cosmic recompute` says so
+        return
+    now = _force_scale(host.provenance.settings, channel)
+    for run in runs:
+        before = _force_scale(run.get("settings", {}), channel)
+        if before and now and before != now:
+            raise CampaignError(
+                f"{folder}: channel {channel} has the scale {now} now, and had {before} in run "
+                f"{run.get('run')}: the sensor was calibrated or changed, and its forces do not go "
+                "into one fit. Name another folder, or set the scale of before"
+            )
+
+
+def _force_scale(settings: Mapping[str, Any], channel: str) -> str:
+    """Return unit and coefficients of a channel by the settings of a run; empty: not known."""
+    daqco = (settings.get("platform") or {}).get("daqco") or {}
+    named = {each.get("name"): each.get("scale") for each in daqco.get("channel", ())}
+    scale = next((e for e in daqco.get("scale", ()) if e.get("name") == named.get(channel)), None)
+    return "" if scale is None else f"{scale.get('unit')} {scale.get('coefficients')}"
 
 
 def _platform(hardware: str) -> str:
