@@ -302,7 +302,7 @@ def run_session(
     program: Path | None = None,
     standard: bool = True,
     secret: int | None = None,
-    told: Callable[[str], object] = str,
+    publish: Callable[[str], object] = str,
 ) -> TrialResult:
     """Measure in a sealed session, freeze the analysis, open the seal.
 
@@ -310,7 +310,7 @@ def run_session(
     ----------
     standard : bool
         The standard is bent at the begin, in the middle and at the end.
-    told : callable
+    publish : callable
         Called with the seal before anything is measured, and with the hash of the analysis before
         the truth is asked for.
 
@@ -320,7 +320,7 @@ def run_session(
         The session does not answer, or its seal is broken.
     """
     with SealedSession(program or sealed_program(), world, fibres, secret=secret) as session:
-        told(f"sealed: {session.seal}")
+        publish(f"sealed: {session.seal}")
         kept: dict[int, MeasuredFibre] = {}
         standards = []
         for number in range(fibres):
@@ -336,7 +336,7 @@ def run_session(
         )
         final = [Measured.of(n, each) for n, each in zip(kept, found.fibres, strict=True)]
         frozen = digest_of(final)
-        told(f"frozen: {frozen}")
+        publish(f"frozen: {frozen}")
         opened = session.open(frozen)
         truth = opened["ei_n_m2"]
         if len(truth) != fibres:

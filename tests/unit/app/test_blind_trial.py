@@ -49,9 +49,9 @@ def test_a_session_is_measured_frozen_and_opened() -> None:
     assert all(abs(row.error_percent) < 25.0 for row in found.rows)
 
 
-def test_seal_and_hash_of_the_analysis_are_told_before_what_they_are_of() -> None:
+def test_seal_and_hash_of_the_analysis_are_published_before_what_they_are_of() -> None:
     said: list[str] = []
-    found = run_session("friendly", 1, secret=5, told=said.append)
+    found = run_session("friendly", 1, secret=5, publish=said.append)
     assert said == [f"sealed: {found.seal}", f"frozen: {found.frozen}"]
     assert hashlib.sha256(found.secret.encode()).hexdigest() == found.seal
     assert f"secret {found.secret}" in table_of([found])[0]

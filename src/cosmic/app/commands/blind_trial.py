@@ -47,7 +47,7 @@ def run(chosen: argparse.Namespace) -> int:
     else:
         program = chosen.sealed_by or sealed_program()
         results = [
-            run_session(chosen.world, chosen.fibres, program=program, told=_say)
+            run_session(chosen.world, chosen.fibres, program=program, publish=_say)
             for _ in range(chosen.sessions)
         ]
     sys.stdout.write("\n".join(table_of(results)) + "\n")

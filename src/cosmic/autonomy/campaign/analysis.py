@@ -386,9 +386,9 @@ def _otherwise(
     """Yield what beside values and intervals differs, in words."""
     if scale is None or not _alike(asdict(scale), asdict(now)):
         yield "the scale of the force"
-    told = {each.number for each in changed}
+    named = {each.number for each in changed}
     for record, result in pairs:
-        if record.number in told or record.bending is None:
+        if record.number in named or record.bending is None:
             continue
         before, after = result_row(record.bending), result_row(result)
         wrong = [name for name in BESIDE if not _alike(_parsed(before[name]), _parsed(after[name]))]

@@ -149,7 +149,7 @@ def test_where_standards_contradict_each_other_the_scale_is_known_no_better_than
     assert half_width_percent(fibre) < 10.0
 
 
-def test_each_standard_is_told_in_per_cent_and_not_in_logarithms() -> None:
+def test_each_standard_is_reported_in_per_cent_and_not_in_logarithms() -> None:
     (one,) = scale_of(1.2).standards
     assert one.off_percent == pytest.approx(20.0, abs=3.5)
     assert one.off_percent == pytest.approx(100.0 * np.expm1(one.off_part))

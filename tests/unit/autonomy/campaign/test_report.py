@@ -238,8 +238,8 @@ def test_a_small_uncertainty_of_the_budget_keeps_its_digits() -> None:
     result = good(1).bending
     assert result is not None
     line = Contribution("jaws and sensor give way", Kind.B, 4.37e-4, "um/uN", -3.2, 1.0)
-    ((_, _, told, _, _),) = budget_rows(replace(result, budget=(line,)))
-    assert told == "0.000437 µm/µN"
+    ((_, _, shown, _, _),) = budget_rows(replace(result, budget=(line,)))
+    assert shown == "0.000437 µm/µN"
 
 
 def texts_of(svg: str) -> list[tuple[float, float, float, str]]:
