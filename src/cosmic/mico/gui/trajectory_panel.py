@@ -265,7 +265,8 @@ class TrajectoryPanel(QWidget):
         player = self.player
         if progress.state is PlayState.ENDED and player and player.rehearsal is not None:
             words = f"done. {_rehearsal_text(player.rehearsal)}"
-        self._say(words, _STATES[progress.state])
+        word = "PAUSED" if progress.state is PlayState.PAUSED else ""
+        self._say(words, _STATES[progress.state], word=word)
         self._enable(running=progress.state is PlayState.RUNNING)
 
     # Showing
@@ -284,9 +285,9 @@ class TrajectoryPanel(QWidget):
         self.mirror_button.setEnabled(there and not running)
         self.rehearse_button.setEnabled(there and not running)
 
-    def _say(self, text: str, state: State) -> None:
+    def _say(self, text: str, state: State, *, word: str = "") -> None:
         self.report.setText(text)
-        self.badge.set_state(state)
+        self.badge.set_state(state, word=word)
 
 
 class _RecordControl(QObject):
