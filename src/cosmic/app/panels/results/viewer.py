@@ -198,7 +198,7 @@ class ResultViewer(QWidget):
         self.pictures.set_scene_shown(bool(first and first.positions))
         pictured = bool(first and (first.films or first.positions))
         self.pictures.setVisible(pictured)
-        curved = bool(first and (first.forces or first.positions))
+        curved = bool(first and (first.forces or first.moved))
         self.curves.setVisible(curved)
         self._happenings = _happenings(first) if first else ()
         above = pictured or bool(self._happenings)
