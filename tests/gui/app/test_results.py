@@ -309,6 +309,23 @@ def test_recordings_are_compared_each_from_its_start(
     assert "compared with stiff" in panel.viewer.facts.text()
 
 
+def test_a_longer_recording_that_is_compared_is_seen_to_its_end(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "short.h5", seconds=2.0)
+    write_force(tmp_path / "long.h5", seconds=8.0)
+    panel.refresh()
+    choose(panel, qtbot, "short")
+    choose(panel, qtbot, "long", also=True)
+    qtbot.waitUntil(lambda: len(panel.viewer.curves.lines) == 2)
+    views = shown_items(panel, pg.ViewBox)
+    assert len(views) == 2
+    for view in views:
+        low, high = view.viewRange()[0]
+        assert low <= 0.0
+        assert high >= 7.9
+
+
 def test_a_recording_that_is_written_grows_on_the_screen(
     panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:

@@ -378,7 +378,9 @@ class ResultViewer(QWidget):
 
 def _happenings(timeline: Timeline) -> tuple[Happening, ...]:
     """Return marks and lines of the log in the order in which they came."""
-    found = [Happening(each.time_s, each.kind, each.text) for each in timeline.marks]
+    found = [
+        Happening(each.time_s, each.kind, with_micro_signs(each.text)) for each in timeline.marks
+    ]
     found += [
         Happening(each.time_s, each.where, with_micro_signs(each.text)) for each in timeline.log
     ]
