@@ -104,3 +104,21 @@ def test_a_procedure_is_saved_as_a_file_and_as_python_and_opened_again(
     assert panel.go_on.isVisible()
     panel.show_waiting("")
     assert not panel.go_on.isVisible()
+
+
+def test_the_script_never_takes_the_place_of_the_procedure(
+    panel: RecorderPanel, tmp_path: Path
+) -> None:
+    panel.show_steps([LightStep(percent=40.0)])
+    panel.save_as(tmp_path / "bright.py")
+    assert "ends in .toml" in panel.line.text()
+    assert not list(tmp_path.iterdir())
+
+
+def test_noting_is_said_only_while_steps_are_noted(
+    panel: RecorderPanel, recorder: FakeRecorder, qtbot: QtBot
+) -> None:
+    qtbot.mouseClick(panel.record, LEFT)
+    assert "Noting" in panel.line.text()
+    qtbot.mouseClick(panel.record, LEFT)
+    assert panel.line.text() == ""

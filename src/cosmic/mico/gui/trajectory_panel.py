@@ -9,6 +9,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog, QLabel, QVBoxLayout, QWidget
 
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.ask_directory import ask_save_file
 from cosmic.frame.gui.build import named, push_button, tight_row
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
@@ -201,10 +202,14 @@ class TrajectoryPanel(QWidget):
     # Recording
 
     def _on_record(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(self, "Record movements to", "", FILTER)
-        if name:
-            path = Path(name)
-            self.record(path if path.suffix else path.with_suffix(SUFFIX))
+        ask_save_file(
+            self,
+            "Record movements to",
+            "",
+            files=FILTER,
+            suffix=SUFFIX,
+            chosen=lambda name: self.record(Path(name)),
+        )
 
     def record(self, path: Path) -> None:
         """Begin to record as the bar says; the dialogue has asked about a file that is there."""
