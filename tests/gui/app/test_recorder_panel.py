@@ -102,8 +102,10 @@ def test_a_procedure_is_saved_as_a_file_and_as_python_and_opened_again(
     assert "none.toml" in panel.line.toolTip()
     panel.show_waiting("Wait for key")
     assert panel.go_on.isVisible()
+    assert panel.line.text() == "Wait for key"
     panel.show_waiting("")
     assert not panel.go_on.isVisible()
+    assert panel.line.text() == ""
 
 
 def test_the_script_never_takes_the_place_of_the_procedure(

@@ -372,8 +372,9 @@ class RecorderPanel(QWidget):
 
     def show_waiting(self, words: str) -> None:
         """Offer to go on with a replay that waits; empty: it waits no longer."""
+        waited = self.go_on.isVisibleTo(self)
         self.go_on.setVisible(bool(words))
-        if words:
+        if words or waited:
             self.say(words)
 
 
