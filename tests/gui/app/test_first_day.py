@@ -63,7 +63,7 @@ def test_no_line_moves_when_a_button_goes(qtbot: QtBot) -> None:
     assert second.geometry() == before
 
 
-def test_what_failed_before_is_not_told_as_what_is_missing_now(make: Make, qtbot: QtBot) -> None:
+def test_a_failure_of_before_is_not_shown_as_what_is_missing_now(make: Make, qtbot: QtBot) -> None:
     window = make(applications=("mico", "daqco", "vico"), cold=True)
     window.raise_panel("First day")
     tasks = window.tasks
