@@ -15,12 +15,14 @@ from cosmic.autonomy.recorded.recorder import ProcedureRecorder
 from cosmic.autonomy.recorded.replay import replay_on
 from cosmic.autonomy.recorded.steps import (
     MoveStep,
+    OperationStep,
     RecordedProcedure,
     WaitForForceStep,
     WaitForOperatorStep,
     load_recorded,
 )
 from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
+from cosmic.frame.errors import ConfigError
 from cosmic.twin.truth import read_truth
 from cosmic.vico.core.vision.finding import find_fibres
 
@@ -63,6 +65,13 @@ def test_a_light_that_becomes_known_was_set_by_nobody() -> None:
             light.return_value = SimpleNamespace(percent=60.0)
             assert recorder.look()
         assert [each.words for each in recorder.steps] == ["Light 60 %"]
+
+
+def test_a_force_that_no_push_may_have_is_refused_before_anything_moves() -> None:
+    with cosmic.connect(rate=20.0) as rig:
+        step = OperationStep(operation=SingleOperation.PUSH, force_un=9999.0)
+        with pytest.raises(ConfigError, match="Push to 9999 µN: the force is not between 0 and"):
+            replay_on(rig.handling, RecordedProcedure(name="p", step=[step]), Surroundings())
 
 
 def test_a_force_is_waited_for_on_the_channel_that_the_step_names() -> None:

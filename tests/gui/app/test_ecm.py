@@ -13,6 +13,7 @@ from cosmic.app.configuration.platform_file import load_platform
 from cosmic.app.panels.path_preview import PathPreview, PreviewState, path_text, poses_along
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.frame.config import shipped_config_dir
+from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.mico.api.planned_path import PlannedPath
 from gui.app.windows import Make, card, mico, scene
 from gui.mico.panels import click, enter, field, part, position, wait_for_position
@@ -129,6 +130,29 @@ def test_in_ecm_a_detour_is_offered_and_driven_after_go(
     wanted = BLOCKED_FROM | {"left.y": 2000.0, "left.z": 0.0}
     for axis, there in wanted.items():
         assert position(card(blocked, axis)) == pytest.approx(there, abs=1.0)
+
+
+def test_detour_beside_a_refusal_of_the_tool_plans_one_in_manual_mode(
+    make: Make, qtbot: QtBot
+) -> None:
+    window = make(applications=("mico", "daqco", "vico"))
+    tasks, workspaces = window.tasks, window.top_bar.workspaces
+    assert tasks is not None
+    assert workspaces is not None
+    qtbot.mouseClick(workspaces.buttons["Handle"], LEFT)
+    qtbot.waitUntil(lambda: "µm" in window.top_bar.clearance_text, timeout=15_000)
+    place(window, qtbot)
+    tool = tasks.tool
+    target = tool.findChildren(QuantityField, "toolTarget")[list(tool.axes).index("left.y")]
+    target.setText("2000")
+    qtbot.keyClick(target, Qt.Key.Key_Return)
+    qtbot.waitUntil(tool.detour.isVisible)
+    qtbot.mouseClick(tool.detour, LEFT)
+    shown = bar(window)
+    qtbot.waitUntil(lambda: shown.state is PreviewState.FOUND, timeout=8000)
+    click(qtbot, shown, "pathGo")
+    wait_for_position(qtbot, card(window, "left.y"), 2000.0)
+    assert window.mode == "MCM"
 
 
 def test_a_free_move_in_ecm_is_made_at_once(blocked: OperatorWindow, qtbot: QtBot) -> None:

@@ -40,6 +40,50 @@ def test_a_step_says_how_far_it_is_and_its_button_carries_it_out(qtbot: QtBot) -
     assert "the lens is away" in panel.message.text()
 
 
+def test_no_line_moves_when_a_button_goes(qtbot: QtBot) -> None:
+    done: list[str] = []
+
+    def look() -> Standing:
+        return Standing(State.OK, "done") if done else Standing(State.UNKNOWN, "not", "A long word")
+
+    panel = FirstDayPanel(
+        (
+            DayStep("First", look, lambda: done.append("it")),
+            DayStep("Second", lambda: Standing(State.OK, "done", "Again"), lambda: None),
+        )
+    )
+    qtbot.addWidget(panel)
+    panel.show()
+    QApplication.processEvents()
+    second = panel.rows["Second"].button
+    before = second.geometry()
+    qtbot.mouseClick(panel.rows["First"].button, LEFT)
+    QApplication.processEvents()
+    assert not panel.rows["First"].button.isVisible()
+    assert second.geometry() == before
+
+
+def test_a_failure_of_before_is_not_shown_as_what_is_missing_now(make: Make, qtbot: QtBot) -> None:
+    window = make(applications=("mico", "daqco", "vico"), cold=True)
+    window.raise_panel("First day")
+    tasks = window.tasks
+    assert tasks is not None
+    rows = tasks.first_day.rows
+    qtbot.waitUntil(lambda: "the zoom is not known" in rows["Scale and rotation"].text.text())
+    qtbot.mouseClick(rows["Scale and rotation"].button, LEFT)
+    qtbot.waitUntil(lambda: "The last calibration failed" in rows["Scale and rotation"].text.text())
+    qtbot.mouseClick(rows["Know your stage"].button, LEFT)
+    qtbot.waitUntil(lambda: "The last check failed" in rows["Know your stage"].text.text())
+    qtbot.mouseClick(rows["Lens"].button, LEFT)
+    qtbot.waitUntil(lambda: rows["Lens"].badge.state is State.OK, timeout=30_000)
+
+    def missing() -> str:
+        return rows["Scale and rotation"].text.text().partition("The last")[0]
+
+    qtbot.waitUntil(lambda: "zoom is not known" not in missing())
+    assert "close to the plate" in missing()
+
+
 def test_a_cold_platform_says_what_is_missing_and_what_to_press(make: Make, qtbot: QtBot) -> None:
     window = make(applications=("mico", "daqco", "vico"), cold=True)
     window.raise_panel("First day")

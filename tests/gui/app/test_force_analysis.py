@@ -44,6 +44,20 @@ def test_statistics_are_those_of_the_last_ten_seconds() -> None:
     assert (found.low, found.high) == (pytest.approx(-2.0, abs=0.01), pytest.approx(2.0, abs=0.01))
 
 
+def test_looking_at_the_statistics_again_and_again_keeps_nothing_older() -> None:
+    recent = RecentValues()
+    for number, chunk in enumerate(
+        chunks(np.concatenate([np.full(15_000, 99.0), np.full(10_000, 1.0)]))
+    ):
+        recent.add(chunk)
+        if number % 10 == 0:
+            recent.statistics()
+    found = recent.statistics()
+    assert found is not None
+    assert found.seconds == pytest.approx(10.0, abs=0.06)
+    assert (found.mean, found.high) == (pytest.approx(1.0), pytest.approx(1.0))
+
+
 def test_what_came_before_a_pause_does_not_count() -> None:
     recent = RecentValues()
     for chunk in chunks(np.full(1000, 50.0)):

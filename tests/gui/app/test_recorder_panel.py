@@ -102,5 +102,25 @@ def test_a_procedure_is_saved_as_a_file_and_as_python_and_opened_again(
     assert "none.toml" in panel.line.toolTip()
     panel.show_waiting("Wait for key")
     assert panel.go_on.isVisible()
+    assert panel.line.text() == "Wait for key"
     panel.show_waiting("")
     assert not panel.go_on.isVisible()
+    assert panel.line.text() == ""
+
+
+def test_the_script_never_takes_the_place_of_the_procedure(
+    panel: RecorderPanel, tmp_path: Path
+) -> None:
+    panel.show_steps([LightStep(percent=40.0)])
+    panel.save_as(tmp_path / "bright.py")
+    assert "ends in .toml" in panel.line.text()
+    assert not list(tmp_path.iterdir())
+
+
+def test_noting_is_said_only_while_steps_are_noted(
+    panel: RecorderPanel, recorder: FakeRecorder, qtbot: QtBot
+) -> None:
+    qtbot.mouseClick(panel.record, LEFT)
+    assert "Noting" in panel.line.text()
+    qtbot.mouseClick(panel.record, LEFT)
+    assert panel.line.text() == ""

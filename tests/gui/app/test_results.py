@@ -19,13 +19,15 @@ from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.results.panel import ResultsPanel
-from cosmic.app.results.sessions import SessionFolder, read_about
+from cosmic.app.results.sessions import SessionFolder, read_about, sessions_in
+from cosmic.app.results.timeline import Timeline, Track, load_timeline
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.recording_file import RecordingFile
 from cosmic.daqco.core.recording_format import AxisPosition, RecordedEvent, RecordingHeader
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import ChannelSettings
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.gui.amounts import size_text
 from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.core.recording.formats import ImageFormat
 from cosmic.vico.core.recording.image_file import ImageFile
@@ -249,6 +251,32 @@ def test_a_film_of_another_day_is_not_shown_beside_a_force(
     assert panel.viewer.timelines[0].films == ()
 
 
+def test_the_scene_of_the_first_moment_is_that_of_the_first_positions(tmp_path: Path) -> None:
+    scale = Scale("as it is", "uN", (0.0, 1.0))
+    channel = ChannelSettings(name="force", board="sim", input="ai0", scale="as it is")
+    path = tmp_path / "push.h5"
+    file = RecordingFile(path, RecordingHeader(RATE_HZ, (channel,), (scale,), BEGUN, START_S))
+    for after_s in (0.08, 1.0):
+        file.add_positions([AxisPosition(START_S + after_s, "left.x", 3600.0)])
+    volts = np.zeros((1, round(2 * RATE_HZ)))
+    file.append(DataChunk(0, START_S, RATE_HZ, ("force",), volts, (scale,)))
+    file.close(complete=True)
+    (session,) = sessions_in([tmp_path])
+    timeline = load_timeline(session.items[0])
+    assert timeline.poses_at(START_S) == {"left.x": 3600.0}
+    assert timeline.poses_at(START_S + 1.9) == {}
+
+
+def test_where_nothing_was_measured_and_nothing_moved_no_empty_axes_are_drawn(
+    panel: ResultsPanel,
+) -> None:
+    times, still = np.array([0.0, 2.0]), np.full(2, 3600.0)
+    axis = Track("left.x", "um", times, still, still, still)
+    panel.viewer.show_timelines([Timeline(Path("film"), 0.0, 2.0, None, positions=(axis,))])
+    assert not panel.viewer.curves.isVisible()
+    assert panel.viewer.pictures.isVisible()
+
+
 def test_the_keyboard_goes_through_a_recording_and_space_plays_it(
     panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:
@@ -279,6 +307,23 @@ def test_recordings_are_compared_each_from_its_start(
     assert "soft: slope 5.000" in text
     assert "stiff: slope 50.000" in text
     assert "compared with stiff" in panel.viewer.facts.text()
+
+
+def test_a_longer_recording_that_is_compared_is_seen_to_its_end(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "short.h5", seconds=2.0)
+    write_force(tmp_path / "long.h5", seconds=8.0)
+    panel.refresh()
+    choose(panel, qtbot, "short")
+    choose(panel, qtbot, "long", also=True)
+    qtbot.waitUntil(lambda: len(panel.viewer.curves.lines) == 2)
+    views = shown_items(panel, pg.ViewBox)
+    assert len(views) == 2
+    for view in views:
+        low, high = view.viewRange()[0]
+        assert low <= 0.0
+        assert high >= 7.9
 
 
 def test_a_recording_that_is_written_grows_on_the_screen(
@@ -451,6 +496,10 @@ def test_the_images_of_a_film_are_listed_once_as_a_film(
     panel.refresh()
     qtbot.waitUntil(lambda: panel.sessions.row_of("film") is not None)
     assert item_names(panel) == {"film"}
+    row = panel.sessions.row_of("film")
+    assert row is not None
+    files = [tmp_path / "film.csv", *(tmp_path / "film").iterdir()]
+    assert row.text(1) == size_text(sum(each.stat().st_size for each in files))
 
 
 def test_a_folder_that_cannot_be_read_hides_no_other(

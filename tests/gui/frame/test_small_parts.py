@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QLineEdit, QPushButton, QWidget
 
 from cosmic.frame.errors import QuantityError
 from cosmic.frame.gui.amounts import duration_text, size_text
+from cosmic.frame.gui.ask_directory import ask_save_file
 from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.number_edit import NumberEdit, read_number
 from cosmic.frame.gui.overwrite_question import overwrite_question
@@ -102,3 +103,19 @@ def test_a_file_is_overwritten_on_the_word_only(qtbot, tmp_path):
     box.open()
     next(each for each in box.findChildren(QPushButton) if each.text() == "Overwrite").click()
     assert done == ["over"]
+
+
+def test_a_file_to_write_gets_its_ending_before_the_dialog_asks_about_it(qtbot, tmp_path):
+    parent, found = QWidget(), []
+    qtbot.addWidget(parent)
+    dialog = ask_save_file(
+        parent,
+        "Save",
+        str(tmp_path / "a.toml"),
+        files="Procedures (*.toml)",
+        suffix=".toml",
+        chosen=found.append,
+    )
+    dialog.selectFile("mine")
+    dialog.accept()
+    assert found == [str(tmp_path / "mine.toml")]

@@ -45,6 +45,18 @@ def test_a_failure_is_reported_with_its_reason(bar):
     assert bar.text.text().endswith("Homing: no lens")
 
 
+def test_how_it_ended_has_the_whole_width_at_the_same_height(qtbot, bar):
+    bar.resize(260, bar.height())
+    task = Task("Autofocus of microscope")
+    bar.follow(task)
+    task.report(0.4, "searching")
+    qtbot.waitUntil(lambda: bar.text.width() < 160)
+    before = bar.sizeHint().height()
+    task.fail(ConfigError("cancelled"))
+    qtbot.waitUntil(lambda: bar.text.width() == bar.width())
+    assert bar.sizeHint().height() <= bar.minimumHeight() == before
+
+
 def test_of_an_older_task_nothing_is_shown_any_more(bar):
     first, second = Task("First"), Task("Second")
     bar.follow(first)

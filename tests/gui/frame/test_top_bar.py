@@ -196,6 +196,24 @@ def test_the_rate_is_shown_where_it_is_not_one(bar: TopBar) -> None:
     assert "time ×20 (reached ×18.7)" in texts(bar)
 
 
+def test_what_is_clicked_stays_in_place_when_a_warning_comes_and_goes(
+    qtbot: QtBot, bar: TopBar
+) -> None:
+    bar.set_collision_model(present=True)
+    bar.set_workspaces((("Set up", "all axes"), ("Look", "the image")))
+    names = ("alarmsButton", "modeList")
+    clicked = [*(bar.findChild(QToolButton, name) for name in names), bar.controls]
+    qtbot.waitUntil(lambda: all(each.isVisible() for each in clicked))
+    QApplication.processEvents()
+    before = [each.mapTo(bar, each.rect().topLeft()).x() for each in clicked]
+    bar.set_rate(1.0, 0.8)
+    bar.set_contacts(("grasp",))
+    bar.set_unwatched(("left.x",))
+    qtbot.waitUntil(lambda: "reached" in texts(bar))
+    QApplication.processEvents()
+    assert [each.mapTo(bar, each.rect().topLeft()).x() for each in clicked] == before
+
+
 def test_only_manual_mode_can_be_chosen_and_the_others_say_why(qtbot: QtBot, bar: TopBar) -> None:
     buttons = {each.property("mode"): each for each in bar.findChildren(QToolButton)}
     assert [buttons[each].text() for each in ("MCM", "SCM", "ECM", "ACM")] == [

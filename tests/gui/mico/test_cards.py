@@ -7,6 +7,8 @@ from pytestqt.qtbot import QtBot
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import State
+from cosmic.mico.core.settings import MotionDefaults
+from cosmic.mico.gui.axis_table import AxisRow
 from cosmic.mico.gui.card import ConfidenceMark
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI
 from cosmic.mico.gui.mico_widget import MicoWidget
@@ -244,6 +246,20 @@ def test_a_refusal_by_the_stop_ends_with_the_reset(panel: MicoWidget, qtbot: QtB
     qtbot.waitUntil(lambda: "reset the stop" in entry.reason)
     panel.show_stopped(None)
     assert not entry.reason
+
+
+def test_no_badge_says_ok_while_everything_is_stopped(panel: MicoWidget, qtbot: QtBot) -> None:
+    card = panel.cards["left.x"]
+    row = AxisRow(card, MotionDefaults(), panel)
+    for cell in row.cells:
+        qtbot.addWidget(cell)
+    row.show_state(card.axis.details)
+    badges = (part(card, "MiCoCL_1", StateBadge), row.badge)
+    assert [each.word for each in badges] == ["OK", "OK"]
+    panel.show_stopped("the test")
+    assert [each.word for each in badges] == ["STOPPED", "STOPPED"]
+    panel.show_stopped(None)
+    assert [each.word for each in badges] == ["OK", "OK"]
 
 
 def test_the_badge_says_busy_while_it_moves_and_stop_ends_only_that_axis(qtbot: QtBot) -> None:

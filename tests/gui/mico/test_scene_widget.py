@@ -10,6 +10,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QLabel, QToolButton, QWidget
 
 from cosmic.frame.gui.palette import contrast_ratio
+from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import apply_theme
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.poses import Pose
@@ -183,6 +184,26 @@ def test_the_width_of_the_distance_does_not_change_with_it(scene):
         scene.set_nearest(Approach(NEAR.bodies, distance_um, NEAR.places_um))
         widths.add(figures.width())
     assert len(widths) == 1
+
+
+def test_nothing_of_a_refusal_is_cut_off_in_an_inset(scene):
+    scene.set_compact(True)
+    scene.resize(136, 102)
+    scene.show_refused(TOUCH)
+    QApplication.processEvents()
+    words = scene.findChild(QLabel, "sceneRefused")
+    line = words.parentWidget()
+    assert not any(each.isVisible() for each in line.findChildren(StateBadge))
+    for each in (words, line.findChild(QToolButton)):
+        assert each.isVisible()
+        assert line.rect().contains(each.geometry())
+
+
+def test_a_refusal_is_taken_away_at_the_left_where_no_inset_lies_over_it(scene):
+    scene.show_refused(TOUCH)
+    QApplication.processEvents()
+    line = scene.findChild(QLabel, "sceneRefused").parentWidget()
+    assert line.findChild(QToolButton).geometry().right() < line.width() / 2
 
 
 def test_a_refused_movement_stands_as_a_ghost_until_it_is_cleared(scene):

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QComboBox, QLineEdit
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit, QScrollArea
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.platform import build_platform
@@ -110,6 +110,7 @@ def test_it_steps_pauses_runs_and_reports_how_far_it_is(
     assert at(panel, mico, "left.y") == pytest.approx(200.0, abs=1.0)
     assert panel.lines.lines.current == 4
     assert panel.run_bar.run.text() == "Resume"
+    assert panel.badge.word == "PAUSED"
     assert "s left" in panel.run_bar.left.text()
     click(qtbot, panel, "runTrajectory")
     wait_for(panel, qtbot, PlayState.ENDED)
@@ -119,6 +120,24 @@ def test_it_steps_pauses_runs_and_reports_how_far_it_is(
     click(qtbot, panel, "runTrajectory")
     qtbot.waitUntil(lambda: panel.run_bar.progress.value() < 100)
     wait_for(panel, qtbot, PlayState.ENDED)
+
+
+def test_what_a_rehearsal_says_does_not_push_the_buttons_below_it(
+    panel: TrajectoryPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    column = QScrollArea()
+    qtbot.addWidget(column)
+    column.setWidgetResizable(True)
+    column.setWidget(panel)
+    show(qtbot, column, 370, 580)
+    opened(panel, qtbot, tmp_path, HEAD + "left.z to 200 um\nwait 1 s\nleft.z to 0 um\n")
+    QApplication.processEvents()
+    before = panel.run_bar.run.mapTo(column, QPoint(0, 0))
+    click(qtbot, panel, "rehearse")
+    qtbot.waitUntil(lambda: "smallest clearance" in panel.report.text())
+    QApplication.processEvents()
+    assert panel.run_bar.run.mapTo(column, QPoint(0, 0)) == before
+    column.takeWidget()
 
 
 def test_it_can_be_cancelled_while_it_loops_for_ever_at_another_speed(

@@ -49,9 +49,9 @@ def _basis(chosen: argparse.Namespace) -> tuple[MeanEi, float]:
 
 def lines_of(mean: MeanEi, wanted_percent: tuple[float, ...], good_part: float) -> list[str]:
     """Return what is said: how many fibres for each precision."""
-    shared = 100.0 * math.expm1(TWO_SIDED * mean.common_std_ln)  # as --shared-percent has it
     lines = [
-        f"spread between fibres: sd of ln(EI) {mean.spread_ln:.2f}; shared by all: ±{shared:.1f} %"
+        f"spread between fibres: sd of ln(EI) {mean.spread_ln:.2f}; "
+        f"shared by all: ±{mean.shared_percent:.1f} %"
     ]
     for each in wanted_percent:
         needed = fibres_needed(mean, each)

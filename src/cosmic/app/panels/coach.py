@@ -5,13 +5,22 @@ from dataclasses import dataclass
 from typing import Final
 
 from PySide6.QtCore import QSettings, Qt, QTimer
-from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QFrame,
+    QLabel,
+    QPushButton,
+    QScrollArea,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
 
 from cosmic.frame.gui.build import named, push_button, styled, tight_row
 from cosmic.frame.gui.key_focus import set_shown
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.units import with_micro_signs
 
+LEAST_LINES: Final = 3
 MOST_LINES: Final = 7
 LOOK_MS: Final = 400
 _KEY: Final = "coach/off"
@@ -67,9 +76,16 @@ class Coach(QFrame):
         self.words = named(QLabel(), "coachWords")
         self.words.setWordWrap(True)
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
-        self.words.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Expanding)
+        line_px = self.words.fontMetrics().lineSpacing()
+        # Long words scroll by themselves in a low panel: the button below them is always seen.
+        room = named(QScrollArea(), "coachRoom")
+        room.setWidgetResizable(True)
+        room.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        room.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Expanding)
+        room.setMinimumHeight(LEAST_LINES * line_px)
         # No more, so that the button is below the words in a high panel, too, and stays there.
-        self.words.setMaximumHeight(MOST_LINES * self.words.fontMetrics().lineSpacing())
+        room.setMaximumHeight(MOST_LINES * line_px)
+        room.setWidget(self.words)
         self.button: QPushButton = named(push_button("", ""), "coachButton")
         self.button.clicked.connect(self._on_pressed)
         foot, row = tight_row(STEP_PX)
@@ -78,7 +94,7 @@ class Coach(QFrame):
         column = QVBoxLayout(self)
         column.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX // 2)
         column.setSpacing(STEP_PX // 2)
-        column.addWidget(self.words, 1)
+        column.addWidget(room, 1)
         column.addWidget(foot)
         kept = self.button.sizePolicy()
         kept.setRetainSizeWhenHidden(True)

@@ -20,6 +20,7 @@ from cosmic.frame.gui.theme import STEP_PX, State
 from cosmic.frame.kept_file import write_whole
 from cosmic.frame.operation import Operation, Task
 from cosmic.frame.overrides import override
+from cosmic.frame.units import with_micro_signs
 from cosmic.mico.core.motion.positioner import Confidence
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.hw.interface import PositionerKind
@@ -207,9 +208,10 @@ class FirstDaySteps:
         problem = self._camera().calibration_problem
         if not problem:
             return Standing(State.OK, "Pixels are positions on the platform", "Calibrate")
+        advice = f"Bring the {self._tool()} into the image and close to the plate first"
         failed = running.failure if running is not None else None
-        text = f"{failed or problem}. Bring the {self._tool()} into the image first"
-        return Standing(State.UNKNOWN, text, "Calibrate")
+        last = f"\nThe last calibration failed: {failed}" if failed is not None else ""
+        return Standing(State.UNKNOWN, f"{problem}. {advice}{last}", "Calibrate")
 
     def calibrate(self) -> None:
         """Measure scale and rotation by moving the tool."""
@@ -224,7 +226,7 @@ class FirstDaySteps:
             text = f"Moves the {self._tool()} to positions from both sides and looks at its tip"
             return Standing(State.UNKNOWN, text, "Check axes")
         if found.failure is not None:
-            return Standing(State.ERROR, str(found.failure), "Check axes")
+            return Standing(State.ERROR, f"The last check failed: {found.failure}", "Check axes")
         return Standing(State.OK, f"{found.result.text}\n{self._report}", "Check axes")
 
     def check_stage(self) -> None:
@@ -323,14 +325,18 @@ class _Row:
         self.text = QLabel()
         self.text.setWordWrap(True)
         self.button = push_button("", step.title)
+        place = self.button.sizePolicy()
+        place.setRetainSizeWhenHidden(True)  # no row moves while another one is clicked
+        self.button.setSizePolicy(place)
         self.button.clicked.connect(lambda: attempt(step))
 
     def refresh(self) -> None:
         standing = self._step.look()
         self.badge.set_state(standing.state)
-        if self.text.text() != standing.text:
-            self.text.setText(standing.text)
+        text = with_micro_signs(standing.text)
+        if self.text.text() != text:
+            self.text.setText(text)
         self.button.setVisible(bool(standing.button))
-        if self.button.text() != standing.button:
+        if standing.button and self.button.text() != standing.button:
             self.button.setText(standing.button)
         self.button.setEnabled(standing.state is not State.BUSY)

@@ -72,14 +72,20 @@ class RecentValues:
         self._next = chunk.first_sample + chunk.samples
         self._values.append(chunk.values[0])
         self._count += chunk.samples
-        most = min(MOST_SAMPLES, round(self._span_s * self._rate_hz))
-        while self._count - self._values[0].size >= most:
+        while self._count - self._values[0].size >= self._most:
             self._count -= self._values.pop(0).size
+
+    @property
+    def _most(self) -> int:
+        return min(MOST_SAMPLES, round(self._span_s * self._rate_hz))
 
     def all(self) -> Values:
         """Return them, oldest first, shape (n,)."""
-        whole = np.concatenate(self._values) if self._values else np.empty(0)
-        self._values = [whole] if self._values else []
+        if not self._values:
+            return np.empty(0)
+        # One array from here on: without the cut it would only ever grow.
+        whole = np.concatenate(self._values)[-self._most :].copy()
+        self._values, self._count = [whole], whole.size
         return whole
 
     def statistics(self) -> Statistics | None:

@@ -23,6 +23,8 @@ from PySide6.QtWidgets import (
 
 from cosmic.daqco.gui.value_field import ValueField
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.file_names import name_problem
+from cosmic.frame.gui.ask_directory import ask_save_file
 from cosmic.frame.gui.build import named, push_button, styled, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
@@ -33,7 +35,8 @@ if TYPE_CHECKING:
 
 RECORDER: Final = "Recorder"
 LOOK_MS: Final = 250
-_FILES: Final = "Recorded procedures (*.toml)"
+SUFFIX: Final = ".toml"
+_FILES: Final = f"Recorded procedures (*{SUFFIX})"
 _USUAL_FORCE_UN: Final = 20.0
 _USUAL_PAUSE_S: Final = 1.0
 
@@ -266,6 +269,7 @@ class RecorderPanel(QWidget):
     def _on_record(self, on: bool) -> None:
         if not on:
             self._look.stop()
+            self.say("")
             self.look()
             self._recorder = None
             self._show_buttons()
@@ -304,14 +308,23 @@ class RecorderPanel(QWidget):
     # Files and replay
 
     def _on_save(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(
-            self, "Save the procedure", str(self._folder() / f"{self.procedure.name}.toml"), _FILES
+        name = self.procedure.name
+        base = "procedure" if name_problem(name) else name
+        ask_save_file(
+            self,
+            "Save the procedure",
+            str(self._folder() / f"{base}{SUFFIX}"),
+            files=_FILES,
+            suffix=SUFFIX,
+            chosen=lambda path: self.save_as(Path(path)),
         )
-        if path:
-            self.save_as(Path(path))
 
     def save_as(self, path: Path) -> None:
-        """Write the file, and the script beside it."""
+        """Write the file, and the script beside it, which must not take its place."""
+        if path.suffix.lower() != SUFFIX:
+            look = state_look(State.REFUSED)
+            self.say(f"{look.glyph} {path.name}: the name of a procedure ends in {SUFFIX}")
+            return
         try:
             self.procedure.save(path)
             self.procedure.save_python(path.with_suffix(".py"))
@@ -359,8 +372,9 @@ class RecorderPanel(QWidget):
 
     def show_waiting(self, words: str) -> None:
         """Offer to go on with a replay that waits; empty: it waits no longer."""
+        waited = self.go_on.isVisibleTo(self)
         self.go_on.setVisible(bool(words))
-        if words:
+        if words or waited:
             self.say(words)
 
 

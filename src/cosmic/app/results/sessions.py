@@ -14,7 +14,7 @@ from tomlkit.exceptions import TOMLKitError
 
 from cosmic.autonomy.campaign.storage_format import DATABASE
 from cosmic.frame.kept_file import write_whole
-from cosmic.vico.core.recording.formats import SIDE_SUFFIX
+from cosmic.vico.core.recording.formats import SIDE_SUFFIX, ImageFormat, recording_suffix
 from cosmic.vico.core.recording.side_row import COLUMNS
 
 logger = logging.getLogger(__name__)
@@ -192,10 +192,20 @@ def _items_of(folder: Path) -> Iterator[Item]:
             continue
         try:
             facts = (path / DATABASE if kind is ItemKind.CAMPAIGN else path).stat()
+            size = facts.st_size + (_images_bytes(path) if kind is ItemKind.IMAGES else 0)
         except OSError:
             continue  # gone since
         changed = datetime.fromtimestamp(facts.st_mtime).astimezone()
-        yield Item(kind, path, changed, facts.st_size)
+        yield Item(kind, path, changed, size)
+
+
+def _images_bytes(side: Path) -> int:
+    """Return how large the images of a side file are: those of a film, or of a directory."""
+    stem = side.name.removesuffix(SIDE_SUFFIX)
+    beside = (side.with_name(stem + recording_suffix(each)) for each in ImageFormat)
+    found = next((path for path in beside if path.exists()), side)
+    files = found.rglob("*") if found.is_dir() else (found,) if found != side else ()
+    return sum(path.stat().st_size for path in files if path.is_file())
 
 
 def _kind(path: Path, filmed: set[str]) -> ItemKind | None:

@@ -26,6 +26,10 @@ MOVED: Final = {"um": 0.5, "deg": 0.05}
 """An axis that went less far did not move."""
 
 
+OUTSIDE_S: Final = 0.5
+"""Positions are read some twenty times a second: so long before the first they were the same."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
     """One quantity over time.
@@ -52,6 +56,13 @@ class Track:
         if not self.time_s.size:
             return float("nan")
         return float(np.interp(time_s, self.time_s, self.values, left=np.nan, right=np.nan))
+
+    def near(self, time_s: float) -> float:
+        """Return the value at a time; a moment before the first or after the last it is theirs."""
+        if not self.time_s.size:
+            return float("nan")
+        inside_s = float(np.clip(time_s, self.time_s[0], self.time_s[-1]))
+        return self.at(inside_s) if abs(inside_s - time_s) <= OUTSIDE_S else float("nan")
 
     def between(self, start_s: float, end_s: float) -> tuple[Values, Values]:
         """Return times and values from one time to another, both shape (n,), those known."""
@@ -136,7 +147,7 @@ class Timeline:
 
     def poses_at(self, time_s: float) -> dict[str, float]:
         """Return where every axis was, by name; those not known are left out."""
-        found = {each.name: each.at(time_s) for each in self.positions}
+        found = {each.name: each.near(time_s) for each in self.positions}
         return {name: value for name, value in found.items() if np.isfinite(value)}
 
 

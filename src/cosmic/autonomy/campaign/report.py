@@ -61,7 +61,6 @@ from cosmic.autonomy.campaign.report_figures import (
 )
 from cosmic.autonomy.campaign.selection import Selection, selection_of
 from cosmic.autonomy.campaign.statistics import (
-    TWO_SIDED,
     CampaignProgress,
     MeanEi,
     fibres_needed,
@@ -297,8 +296,8 @@ def _plan(mean: MeanEi) -> str:
         return NONE
     wanted = ((each, fibres_needed(mean, each)) for each in PRECISIONS_PERCENT)
     words = [f"±{each:g} %: {'no number' if math.isinf(n) else f'{n:.0f}'}" for each, n in wanted]
-    shared = 100.0 * TWO_SIDED * mean.common_std_ln
-    return f"{'; '.join(words)} (±{shared:.1f} % is shared by all and does not average out)"
+    shared = f"±{mean.shared_percent:.1f} % is shared by all and does not average out"
+    return f"{'; '.join(words)} ({shared})"
 
 
 def _rate_rows(data: ReportData) -> list[tuple[str, str]]:

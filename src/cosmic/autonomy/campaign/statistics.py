@@ -46,6 +46,11 @@ class MeanEi:
             return math.inf
         return 50.0 * (self.ei_high_n_m2 - self.ei_low_n_m2) / self.ei_n_m2
 
+    @property
+    def shared_percent(self) -> float:
+        """By how much the mean may be off, upwards, by what all fibres share; with 95 %."""
+        return 100.0 * math.expm1(TWO_SIDED * self.common_std_ln)
+
 
 @dataclass(frozen=True, slots=True)
 class CampaignProgress:

@@ -322,6 +322,9 @@ def _part(step: RecordedStep, work: HandlingContext, around: Surroundings) -> Pa
             raise ConfigError(f"{step.words}: mark a fibre in the image, then replay on it")
         return build_take(work.settings, around.marked).root
     if step.operation is SingleOperation.PUSH:
+        most = work.settings.push.limit_un  # said now, not when the fibre is before the probe
+        if not 0.0 < step.force_un <= most:
+            raise ConfigError(f"{step.words}: the force is not between 0 and {most:g} µN")
         return build_push(PushToForce(step.force_un)).root
     builds = {
         SingleOperation.BRING: build_bring,

@@ -1,4 +1,4 @@
-"""The question which directory."""
+"""The questions which directory, and which file to write."""
 
 from collections.abc import Callable
 
@@ -13,3 +13,25 @@ def ask_directory(parent: QWidget, title: str, start: str, chosen: Callable[[str
     dialog.fileSelected.connect(chosen)
     dialog.finished.connect(dialog.deleteLater)
     dialog.open()
+
+
+def ask_save_file(
+    parent: QWidget,
+    title: str,
+    start: str,
+    *,
+    files: str,
+    suffix: str,
+    chosen: Callable[[str], object],
+) -> QFileDialog:
+    """Open a dialog that calls `chosen` with the file to write; returns at once.
+
+    A name without an ending gets `suffix` before the dialog asks about a file that is there.
+    """
+    dialog = QFileDialog(parent, title, start, files)
+    dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+    dialog.setDefaultSuffix(suffix)
+    dialog.fileSelected.connect(chosen)
+    dialog.finished.connect(dialog.deleteLater)
+    dialog.open()
+    return dialog

@@ -194,6 +194,7 @@ QProgressBar[look="bar"] { min-height: 8px; border: none; }
 #centralView { background: $field; }
 #centralInset { background: $panel; border: 1px solid $border_strong; }
 #coach { background: $raised; border: 1px solid $border; border-radius: 4px; }
+#coachRoom, #coachRoom > QWidget > QWidget { background: transparent; }
 #operationCard { background: $raised; border: 1px solid $border_strong; border-radius: 4px; }
 #padButton { padding: 0px; min-width: 30px; max-width: 46px; min-height: 26px; }
 #axisTable QPushButton, #axisTable QToolButton, #axisTable QLineEdit {

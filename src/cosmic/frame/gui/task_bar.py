@@ -51,10 +51,6 @@ class TaskBar(QWidget):
         row.addWidget(self.text, 1)
         row.addWidget(self.bar)
         row.addWidget(self.cancel)
-        kept = self.sizePolicy()
-        kept.setRetainSizeWhenHidden(True)  # what stands around it stays where it is
-        for widget in (self.bar, self.cancel):
-            widget.setSizePolicy(kept)
         self.watch = TaskWatch(self)
         self.watch.progressed.connect(self._on_progressed)
         self._show_running(running=False)
@@ -73,6 +69,8 @@ class TaskBar(QWidget):
         self.text.set_text(glyph + text)
 
     def _show_running(self, *, running: bool) -> None:
+        # Only the height is kept, so that nothing moves: how it ended has the whole width.
+        self.setMinimumHeight(self.cancel.sizeHint().height())
         self.bar.setVisible(running)
         self.cancel.setVisible(running or self._closable)
         if self._closable:

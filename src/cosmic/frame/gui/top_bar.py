@@ -269,8 +269,8 @@ class TopBar(QWidget):
         self._first_row.setSpacing(STEP_PX)
         self._first_row.addWidget(self._message_state)
         self._first_row.addWidget(self._message, 1)
-        # Where they are seen while stopped, too.
-        for warning in (self._controls, self._contacts, self._unwatched):
+        # Seen while stopped, too. What comes and goes stands left of what is clicked.
+        for warning in (self._contacts, self._unwatched, self._controls):
             self._first_row.addWidget(warning)
         self._first_row.addWidget(self._theme)
         second = QHBoxLayout()
@@ -307,9 +307,13 @@ class TopBar(QWidget):
         self._modes.set_compact()
         self._second_row.setSpacing(STEP_PX)
         self._second_row.insertWidget(self._second_row.indexOf(self._pages), buttons)
-        for widget in (self._modes, self._no_model, self._rate):
+        for widget, before in (
+            (self._modes, self._theme),
+            (self._no_model, self._controls),
+            (self._rate, self._controls),
+        ):
             self._normal_row.removeWidget(widget)
-            self._first_row.insertWidget(self._first_row.indexOf(self._theme), widget)
+            self._first_row.insertWidget(self._first_row.indexOf(before), widget)
         self._first_row.insertWidget(self._first_row.indexOf(self._theme), self._alarms)
 
     @property

@@ -49,6 +49,7 @@ class _Command:
     movement: Movement
     consented: bool
     goal: Goal | None = None
+    detour: bool = False
     why: Callable[[], str] = str
 
 
@@ -95,7 +96,10 @@ class AxisCommands(QObject):
         self._refused_wall_s = 0.0
         self._blocked: _Command | None = None
         self.plans_detours = False
-        """Have a detour planned where something stands in the way of a move to a goal."""
+        """Have a detour planned where something stands in the way of a move to a goal.
+
+        A command keeps what was wanted when it was given: the gate answers later.
+        """
 
     @property
     def series(self) -> StepwiseMove | None:
@@ -129,7 +133,9 @@ class AxisCommands(QObject):
 
         With a `goal`, a detour may be planned where something stands in the way.
         """
-        self._issue(_Command(what, make, field, Movement(), consented=False, goal=goal))
+        detour = goal is not None and self.plans_detours
+        command = _Command(what, make, field, Movement(), consented=False, goal=goal, detour=detour)
+        self._issue(command)
 
     def _issue(self, command: _Command) -> None:
         self.abandon_series()
@@ -181,7 +187,7 @@ class AxisCommands(QObject):
             self.ended.emit(command.why() if isinstance(error, MoveCancelled) else str(error))
             return
         reason = error.verdict.reason
-        if reason is Reason.COLLISION and command.goal is not None and self.plans_detours:
+        if reason is Reason.COLLISION and command.goal is not None and command.detour:
             self._want_detour(command, command.goal, error.verdict)
             return
         self.verdict_given.emit(error.verdict)

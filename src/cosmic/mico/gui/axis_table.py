@@ -51,6 +51,7 @@ class AxisRow(QObject):
         self.card = card
         self._defaults = defaults
         self._target_set = False
+        self._state: PositionerState | None = None
         axis, settings = card.axis, card.settings
         self._has_sensor = axis.kind is not PositionerKind.OPEN_LOOP
         self.name = named(QLabel(settings.name), "rowName")
@@ -112,7 +113,7 @@ class AxisRow(QObject):
 
     def show_state(self, state: PositionerState) -> None:
         """Show the newest state of the axis."""
-        self.badge.set_state(STATES[state.status], state.error)
+        self._state = state
         self.position.show_position(state.shown_position)
         text, _tone, tip = CONFIDENCE[state.confidence]
         if self.confidence.toolTip() != tip:
@@ -126,6 +127,8 @@ class AxisRow(QObject):
         self._show_line()
 
     def _show_line(self) -> None:
+        if self._state is not None:
+            self.card.put_on(self.badge, STATES[self._state.status], self._state.error)
         text = self.card.status_text
         self.line.set_text(text, *_shorter(text))
 

@@ -262,8 +262,15 @@ class PositionerBaseGUI(Card):
         edge = State.ERROR if self._stopped else badge
         if (badge, detail, edge) != self._shown:  # most states differ in the position alone
             self._shown = (badge, detail, edge)
-            self._badge.set_state(badge, detail)
+            self.put_on(self._badge, badge, detail)
             self.set_edge(edge)
+
+    def put_on(self, badge: StateBadge, state: State, detail: str) -> None:
+        """Show the state of the axis on a badge: while stopped, none says that all is well."""
+        if self._stopped and state is State.OK:
+            badge.set_state(State.REFUSED, detail, word="STOPPED")
+        else:
+            badge.set_state(state, detail)
 
     @staticmethod
     def _activity_text(state: PositionerState) -> str:

@@ -1,14 +1,17 @@
 """The lines of a trajectory: the one under way is marked, those at fault say why."""
 
 from collections.abc import Iterable, Sequence
+from typing import Final
 
-from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, Qt
+from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, QSize, Qt
 from PySide6.QtGui import QColor, QFont
 from PySide6.QtWidgets import QListView, QWidget
 
-from cosmic.frame.gui.theme import State, code_font, current_palette, state_look
+from cosmic.frame.gui.theme import STEP_PX, State, code_font, current_palette, state_look
 from cosmic.frame.overrides import override
 from cosmic.mico.core.trajectory.model import Problem
+
+LEAST_PX: Final = 10 * STEP_PX
 
 _Index = QModelIndex | QPersistentModelIndex
 _DISPLAY = Qt.ItemDataRole.DisplayRole
@@ -113,6 +116,11 @@ class TrajectoryLines(QListView):
         self.setEditTriggers(QListView.EditTrigger.NoEditTriggers)
         self.lines = TrajectoryLinesModel(self)
         self.setModel(self.lines)
+
+    @override
+    def sizeHint(self) -> QSize:
+        # As low as it may be: it gives way to what is said below it, so that no button moves.
+        return QSize(super().sizeHint().width(), LEAST_PX)
 
     def show_line(self, line: int) -> None:
         """Mark the line under way, and bring it in sight."""

@@ -9,6 +9,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog, QLabel, QVBoxLayout, QWidget
 
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.ask_directory import ask_save_file
 from cosmic.frame.gui.build import named, push_button, tight_row
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
@@ -201,10 +202,14 @@ class TrajectoryPanel(QWidget):
     # Recording
 
     def _on_record(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(self, "Record movements to", "", FILTER)
-        if name:
-            path = Path(name)
-            self.record(path if path.suffix else path.with_suffix(SUFFIX))
+        ask_save_file(
+            self,
+            "Record movements to",
+            "",
+            files=FILTER,
+            suffix=SUFFIX,
+            chosen=lambda name: self.record(Path(name)),
+        )
 
     def record(self, path: Path) -> None:
         """Begin to record as the bar says; the dialogue has asked about a file that is there."""
@@ -265,7 +270,8 @@ class TrajectoryPanel(QWidget):
         player = self.player
         if progress.state is PlayState.ENDED and player and player.rehearsal is not None:
             words = f"done. {_rehearsal_text(player.rehearsal)}"
-        self._say(words, _STATES[progress.state])
+        word = "PAUSED" if progress.state is PlayState.PAUSED else ""
+        self._say(words, _STATES[progress.state], word=word)
         self._enable(running=progress.state is PlayState.RUNNING)
 
     # Showing
@@ -284,9 +290,9 @@ class TrajectoryPanel(QWidget):
         self.mirror_button.setEnabled(there and not running)
         self.rehearse_button.setEnabled(there and not running)
 
-    def _say(self, text: str, state: State) -> None:
+    def _say(self, text: str, state: State, *, word: str = "") -> None:
         self.report.setText(text)
-        self.badge.set_state(state)
+        self.badge.set_state(state, word=word)
 
 
 class _RecordControl(QObject):

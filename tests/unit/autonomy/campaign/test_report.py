@@ -10,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from cosmic.app.cli import main
 from cosmic.autonomy.bending.result import Contribution, Kind
 from cosmic.autonomy.campaign.formatting import budget_rows, length_words
 from cosmic.autonomy.campaign.records import (
@@ -72,6 +73,15 @@ def test_the_page_needs_no_other_file(page: str) -> None:
     assert "<script" not in page
     assert "@import" not in page
     assert "url(" not in page
+
+
+def test_what_all_fibres_share_is_as_the_command_for_the_size_of_a_sample_has_it(
+    folder: Path, page: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["sample-size", str(folder)]) == 0
+    printed = re.search(r"shared by all: (±[\d.]+ %)", capsys.readouterr().out)
+    assert printed is not None
+    assert f"({printed[1]} is shared by all" in page
 
 
 @pytest.mark.parametrize(

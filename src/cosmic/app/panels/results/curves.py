@@ -210,10 +210,13 @@ class ResultCurves(CurveFrame):
         return min(float(w.min()) for w in known), max(float(w.max()) for w in known)
 
     def show_all(self) -> None:
-        """Show everything."""
+        """Show everything: the longest of the recordings, where forces are drawn."""
+        forces = bool(self._lines)
+        # What is linked pulls both ways: the axes of the first would cut off a longer one.
+        self._upper.enableAutoRange(x=forces, y=True)
+        self._lower.enableAutoRange(x=not forces, y=True)
         for box in (self._upper, self._lower):
-            box.enableAutoRange()
-            box.autoRange()
+            box.updateAutoRange()
 
     def zoom_to_cursors(self) -> None:
         """Show what lies between the cursors."""

@@ -96,6 +96,8 @@ class SessionList(QWidget):
         self.list = named(QTreeWidget(), "resultsList")
         self.list.setHeaderLabels(["Recording", "Size"])
         self.list.setIconSize(THUMBNAIL)
+        # What tells two recordings of one name apart is their time, at the end.
+        self.list.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         self.list.setIndentation(STEP_PX)
         head = self.list.header()
         head.setStretchLastSection(False)

@@ -198,7 +198,7 @@ class ResultViewer(QWidget):
         self.pictures.set_scene_shown(bool(first and first.positions))
         pictured = bool(first and (first.films or first.positions))
         self.pictures.setVisible(pictured)
-        curved = bool(first and (first.forces or first.positions))
+        curved = bool(first and (first.forces or first.moved))
         self.curves.setVisible(curved)
         self._happenings = _happenings(first) if first else ()
         above = pictured or bool(self._happenings)
@@ -378,7 +378,9 @@ class ResultViewer(QWidget):
 
 def _happenings(timeline: Timeline) -> tuple[Happening, ...]:
     """Return marks and lines of the log in the order in which they came."""
-    found = [Happening(each.time_s, each.kind, each.text) for each in timeline.marks]
+    found = [
+        Happening(each.time_s, each.kind, with_micro_signs(each.text)) for each in timeline.marks
+    ]
     found += [
         Happening(each.time_s, each.where, with_micro_signs(each.text)) for each in timeline.log
     ]

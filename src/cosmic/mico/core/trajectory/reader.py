@@ -147,7 +147,7 @@ class TrajectoryReader:
         parts = said.split()
         if len(parts) != 2 or parts[0] != "cosmic-trajectory":
             raise QuantityError(
-                f"this is no trajectory: it begins with 'cosmic-trajectory {VERSION}'"
+                f"this is no trajectory: the first line of one is 'cosmic-trajectory {VERSION}'"
             )
         if words.whole(parts[1], "a version") != VERSION:
             raise QuantityError(

@@ -73,10 +73,16 @@ class RefusedLine(QWidget):
         row.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX // 2)
         row.setSpacing(STEP_PX)
         self.setAutoFillBackground(True)
-        row.addWidget(StateBadge(State.REFUSED))
+        self._badge = StateBadge(State.REFUSED)
+        # At the left: another picture lies over the lower right of a large scene.
+        for widget in (self._badge, away):
+            row.addWidget(widget)
         row.addWidget(self._words, 1)
-        row.addWidget(away)
         self.hide()
+
+    def set_compact(self, compact: bool) -> None:
+        """Leave out the badge, which an inset has no room for; the ghost is drawn there."""
+        self._badge.setVisible(not compact)
 
     @property
     def text(self) -> str:

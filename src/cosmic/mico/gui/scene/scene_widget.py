@@ -105,6 +105,7 @@ class SceneWidget(QWidget):
         """Show the view alone, as an inset does, or with its buttons and the nearest pair."""
         for each in (self._toolbar, self._nearest):
             each.setVisible(not compact)
+        self._refused.set_compact(compact)
 
     def set_moving(self, on: bool) -> None:
         """Have the left button aim a tool, or turn what is seen."""
