@@ -307,6 +307,25 @@ def test_standing_short_of_the_target_is_a_failure():
             movement.wait(3)
 
 
+def test_an_axis_that_says_too_early_that_it_is_stationary_is_stopped():
+    with mico(instant=False) as (rig, controller):
+        movement = rig["d0.c0"].move_to(100.0, wait=False)
+        wait_until(lambda: controller.of("move_to"))
+        controller.end(X, 3.0)
+        with pytest.raises(DeviceError, match=r"stopped at 3.0 µm instead of 100.0 µm"):
+            movement.wait(5)
+        assert ("stop", X) in controller.calls
+
+
+def test_an_axis_that_moves_without_an_order_is_stopped_and_says_so():
+    with mico() as (rig, controller):
+        controller.activity[X] = Activity.TARGETING
+        wait_until(lambda: ("stop", X) in controller.calls)
+        wait_until(lambda: "without an order" in (rig["d0.c0"].details.error or ""))
+        assert rig["d0.c0"].move_to(5.0) == 5.0
+        assert not rig["d0.c0"].details.error
+
+
 def test_a_channel_that_makes_no_progress_is_stopped():
     with mico(instant=False, watch={"stall_s": 0.5}) as (rig, controller):
         movement = rig["d0.c0"].move_to(100.0, wait=False)
