@@ -8,7 +8,14 @@ import pytest
 import cosmic
 from cosmic.frame.errors import DeviceError, DeviceFault, UnknownAxisError
 from cosmic.mico.core.motion.positioner import Confidence, Status
-from cosmic.mico.hw.interface import Activity, Channel, PositionerKind
+from cosmic.mico.hw.interface import (
+    Activity,
+    Channel,
+    PositionerKind,
+    PositionerType,
+    ReferenceKind,
+    TypeRead,
+)
 from unit.mico.rigs import mico, wait_until
 
 X = Channel(0, 0)
@@ -194,6 +201,19 @@ def test_an_unknown_position_needs_consent_or_a_reference():
         assert axis.move_to(10.0, consent=True) == 10.0
         axis.reference(consent=True)
         assert axis.confidence is Confidence.KNOWN
+
+
+def test_an_unknown_axis_without_a_reference_is_not_sent_to_the_initialisation():
+    def power_up(controller):
+        controller.known = False
+        controller.ask_type = lambda channel: controller.emit(
+            TypeRead(channel, PositionerType(0, "own", PositionerKind.LINEAR, ReferenceKind.NONE))
+        )
+
+    with mico(("L",), prepare=power_up) as (rig, _):
+        with pytest.raises(cosmic.MoveRefused, match="no reference to look for; give consent"):
+            rig["d0.c0"].move_to(10.0)
+        assert rig["d0.c0"].move_to(10.0, consent=True) == 10.0
 
 
 def test_initialise_references_in_the_configured_order_and_takes_the_start_pose():
