@@ -1,5 +1,6 @@
 """EPICS: what is declared is a record; puts pass the lease, and who dies leaves nothing moving."""
 
+import asyncio
 import json
 import signal
 import socket
@@ -13,6 +14,7 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
+import caproto
 import pytest
 
 from contract.cabinet import Cabinet, Colour, Lamp, WithBell
@@ -20,6 +22,7 @@ from contract.station_rig import free_port, wait_until
 from cosmic.app.configuration.gateways import Doors, EpicsSettings, HttpSettings
 from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.epics import EpicsGateway
+from cosmic.app.gateways.epics_channels import Who, whole
 from cosmic.app.gateways.session import GatewaySession
 from cosmic.frame.declaration import command, state
 from cosmic.frame.errors import ConfigError, OperationCancelled
@@ -267,6 +270,19 @@ def test_a_stop_is_carried_out_whatever_is_put(said: object) -> None:
     with opened() as door, used(door) as client:
         assert client.put("T:cabinet:stop", said)
         assert door.home.stops == 1
+
+
+@pytest.mark.parametrize(("said", "put"), [(0.5, 1), (-0.2, 1), (7.0, 7), (0.0, 0)])
+def test_a_part_of_one_is_not_cut_to_nothing_where_a_put_stops(said: float, put: int) -> None:
+    values: list[int] = []
+
+    async def took(_who: Who, value: int) -> None:
+        values.append(value)
+
+    channel = whole(put=took, otherwise=1)
+    double = caproto.ChannelType.DOUBLE
+    asyncio.run(channel.auth_write("host", "user", [said], double, None))
+    assert values == [put]
 
 
 def test_a_gateway_that_only_shows_still_lets_everybody_stop() -> None:
