@@ -336,6 +336,14 @@ def test_pages_that_differ_in_more_than_height_are_no_focal_stack(
         measure_stack(list(read_images(tmp_path / "a.tif")))
 
 
+def test_a_run_that_measured_nothing_leaves_no_folder_that_it_made(tmp_path: Path) -> None:
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    for folder in (kept, tmp_path / "new" / "inner"):
+        assert main(["measure", str(tmp_path / "nope.png"), "--output", str(folder)]) == 1
+    assert list(tmp_path.iterdir()) == [kept]
+
+
 def test_a_run_that_measured_nothing_is_not_in_the_way_of_the_next(image: Path, out: Path) -> None:
     assert main(["measure", str(image.with_name("nosuch.png")), "--output", str(out)]) == 1
     assert main(["measure", str(image), "--output", str(out)]) == 0
