@@ -131,11 +131,19 @@ def read_poses(path: Path) -> dict[str, Pose]:
         if not NAME.fullmatch(name) or not isinstance(table, dict) or not table:
             raise ConfigError(f"{path}: {name}: is no pose: [name] and a position for each axis")
         for axis, value in table.items():
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not number or not math.isfinite(value):
+            if not _is_position(value):
                 raise ConfigError(f"{path}: {name}.{axis}: {reprlib.repr(value)} is no position")
         poses[name] = Pose(name, {axis: float(value) for axis, value in table.items()})
     return poses
+
+
+def _is_position(value: object) -> bool:
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number that no float can be
+        return False
 
 
 def pose_misfits(poses: Mapping[str, Pose], kinds: Mapping[str, str]) -> list[str]:

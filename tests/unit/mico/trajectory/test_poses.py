@@ -46,6 +46,7 @@ def test_what_the_user_wrote_into_the_file_stays(tmp_path: Path) -> None:
         "a = 1\n",
         "[a]\nx = 'far'\n",
         "[a]\nx = nan\n",
+        f"[a]\nx = 1{'0' * 400}\n",
         "[a]\nx = true\n",
         "[a",
         '["#"]\nx=1\n',
