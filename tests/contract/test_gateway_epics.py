@@ -19,7 +19,7 @@ import pytest
 
 from contract.cabinet import Cabinet, Colour, Lamp, WithBell
 from contract.station_rig import free_port, wait_until
-from cosmic.app.configuration.gateways import Doors, EpicsSettings, HttpSettings
+from cosmic.app.configuration.gateways import Doors, EpicsSettings, HttpSettings, doors
 from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.epics import EpicsGateway
 from cosmic.app.gateways.epics_channels import Who, whole
@@ -392,3 +392,8 @@ def test_a_prefix_is_what_epics_takes(prefix: str) -> None:
     assert EpicsSettings(prefix=prefix).prefix == prefix
     with pytest.raises(ValueError, match="prefix"):
         EpicsSettings(prefix="no spaces")
+
+
+def test_a_prefix_of_the_command_line_that_is_none_is_refused_in_words() -> None:
+    with pytest.raises(ConfigError, match=r"--epics: prefix: .*'a b'"):
+        doors(HttpSettings(), EpicsSettings(), prefix="a b")

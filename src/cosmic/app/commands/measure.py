@@ -180,15 +180,20 @@ def _without_results(chosen: Sequence[Path], folder: Path) -> list[Path]:
     """Leave out results of an earlier run that a pattern such as ``*.png`` named as well."""
     if not (folder / WHOLE).exists():
         return list(chosen)
-    apart = folder.resolve()
+    apart = _real(folder)
     kept = [
         each
         for each in chosen
-        if not (OF_AN_IMAGE.fullmatch(each.name) and each.parent.resolve() == apart)
+        if not (OF_AN_IMAGE.fullmatch(each.name) and _real(each.parent) == apart)
     ]
     if len(kept) < len(chosen):
         _say(f"{folder}: results of an earlier run left out: {len(chosen) - len(kept)}")
     return kept
+
+
+def _real(path: Path) -> Path:
+    """Return what links lead to; links in a circle are refused where they are read."""
+    return Path(os.path.realpath(path))
 
 
 def _is_folder(path: Path) -> bool:
@@ -326,7 +331,7 @@ def _measured_stack(file: Path, folder: Path, stem: str, chosen: argparse.Namesp
 def _check_apart(folder: Path, chosen: Sequence[Path]) -> None:
     """Refuse results among the images: the next run would measure overlays as images."""
     for each in chosen:
-        if _is_folder(each) and each.resolve() == folder.resolve():
+        if _is_folder(each) and _real(each) == _real(folder):
             raise RecordingError(f"{folder}: holds the images; choose another folder with --output")
 
 
@@ -357,10 +362,10 @@ def _prepare(folder: Path, files: Sequence[Path], *, overwrite: bool) -> tuple[P
         raise RecordingError(
             f"{there[0]}: exists; choose another folder with --output, or say --overwrite"
         )
-    images = {each.resolve() for each in files}
+    images = {_real(each) for each in files}
     try:
         for each in there:
-            if each.resolve() not in images:
+            if _real(each) not in images:
                 each.unlink()
     except OSError as exc:
         raise RecordingError(f"{folder}: cannot be cleared ({exc.strerror or exc})") from exc

@@ -151,9 +151,11 @@ def fibres_needed(mean: MeanEi, precision_percent: float) -> float:
     if mean.count < 2:
         return math.nan
     half, shared = math.log1p(precision_percent / 100.0), TWO_SIDED * mean.common_std_ln
-    if shared >= half:
+    left = half**2 - shared**2
+    if shared >= half or left == 0.0:  # as of a half width whose square is no number any more
         return math.inf
-    return math.ceil((TWO_SIDED * mean.spread_ln) ** 2 / (half**2 - shared**2))
+    needed = (TWO_SIDED * mean.spread_ln) ** 2 / left
+    return math.ceil(needed) if math.isfinite(needed) else math.inf
 
 
 def progress(fibres: Sequence[FibreRecord], elapsed_s: float, plates: int = 0) -> CampaignProgress:

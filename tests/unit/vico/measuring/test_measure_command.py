@@ -163,6 +163,17 @@ def test_a_name_that_no_file_can_have_is_refused(
     assert len(rows_of(out / "fibres.csv")) == 1
 
 
+def test_links_in_a_circle_are_refused_and_the_others_measured(
+    image: Path, out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    circle = image.with_name("circle.png")
+    circle.symlink_to(circle.name)
+    assert main(["measure", str(circle), str(image), "--output", str(out)]) == 1
+    assert f"cosmic: {circle}: " in capsys.readouterr().err
+    assert len(rows_of(out / "fibres.csv")) == 1
+    assert main(["measure", str(image), "--output", str(circle)]) == 1
+
+
 @pytest.mark.parametrize("option", ["measure", "--output"])
 def test_an_empty_name_is_refused(
     image: Path, option: str, capsys: pytest.CaptureFixture[str]
