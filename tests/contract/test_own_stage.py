@@ -49,7 +49,7 @@ def test_a_device_that_goes_in_the_middle_of_a_movement_is_reported_as_gone(made
             rig.controller.receive(0, 0.1)
 
 
-def test_a_stop_that_fails_is_told_of_the_axis_that_goes_on(made):
+def test_a_stop_that_fails_names_the_axis_that_goes_on(made):
     rig, unit = made
     unit.wrong["stop"] = raising(DeviceError("not now"))
     with pytest.raises(DeviceError, match=r"channel 1.*not now") as caught:
