@@ -1,5 +1,6 @@
 """EPICS: what is declared is a record; puts pass the lease, and who dies leaves nothing moving."""
 
+import asyncio
 import json
 import signal
 import socket
@@ -13,13 +14,15 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
+import caproto
 import pytest
 
 from contract.cabinet import Cabinet, Colour, Lamp, WithBell
 from contract.station_rig import free_port, wait_until
-from cosmic.app.configuration.gateways import Doors, EpicsSettings, HttpSettings
+from cosmic.app.configuration.gateways import Doors, EpicsSettings, HttpSettings, doors
 from cosmic.app.gateways.approvals import Approvals
 from cosmic.app.gateways.epics import EpicsGateway
+from cosmic.app.gateways.epics_channels import Who, whole
 from cosmic.app.gateways.session import GatewaySession
 from cosmic.frame.declaration import command, state
 from cosmic.frame.errors import ConfigError, OperationCancelled
@@ -269,6 +272,19 @@ def test_a_stop_is_carried_out_whatever_is_put(said: object) -> None:
         assert door.home.stops == 1
 
 
+@pytest.mark.parametrize(("said", "put"), [(0.5, 1), (-0.2, 1), (7.0, 7), (0.0, 0)])
+def test_a_part_of_one_is_not_cut_to_nothing_where_a_put_stops(said: float, put: int) -> None:
+    values: list[int] = []
+
+    async def took(_who: Who, value: int) -> None:
+        values.append(value)
+
+    channel = whole(put=took, otherwise=1)
+    double = caproto.ChannelType.DOUBLE
+    asyncio.run(channel.auth_write("host", "user", [said], double, None))
+    assert values == [put]
+
+
 def test_a_gateway_that_only_shows_still_lets_everybody_stop() -> None:
     with opened(write=False) as door, used(door) as client:
         assert not client.put("T:control", 1)
@@ -376,3 +392,8 @@ def test_a_prefix_is_what_epics_takes(prefix: str) -> None:
     assert EpicsSettings(prefix=prefix).prefix == prefix
     with pytest.raises(ValueError, match="prefix"):
         EpicsSettings(prefix="no spaces")
+
+
+def test_a_prefix_of_the_command_line_that_is_none_is_refused_in_words() -> None:
+    with pytest.raises(ConfigError, match=r"--epics: prefix: .*'a b'"):
+        doors(HttpSettings(), EpicsSettings(), prefix="a b")

@@ -10,8 +10,12 @@ from pathlib import Path
 import pytest
 
 import cosmic
-from contract.station_rig import wait_until
+from contract.station_rig import free_port, wait_until
 from cosmic.app.cli import main
+from cosmic.app.configuration.network import NetworkSettings, serving
+from cosmic.app.platform import build_platform
+from cosmic.app.rig import Rig
+from cosmic.app.stations.host import StationHost
 from cosmic.daqco.api.application import HANG_S
 from cosmic.frame.clock import WALL
 from cosmic.frame.plugins import find_backend
@@ -20,6 +24,7 @@ from cosmic.frame.time_scale import LONGEST_HOLD_S
 POINTS = """
 [cosmic.applications]
 heater = {0}:HEATER
+unserved = {0}:UNSERVED
 broken = no_such_package:BACKEND
 [cosmic.contacts]
 shrug = {0}:SHRUG
@@ -47,6 +52,8 @@ from cosmic.autonomy.shipped.registry import ShippedProcedure, procedure_backend
 from cosmic.daqco.api.export import ExporterBackend
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.config import StrictModel
+from cosmic.frame.declaration import Declared, stream
+from cosmic.frame.network.transport import Rule
 from cosmic.mico.core.collision.callback import CollisionCallbackBase, ContactBackend, Response
 from cosmic.mico.core.motion.orders import MoveTo
 from cosmic.mico.core.motion.positioner import (
@@ -73,6 +80,18 @@ class Heater(CosmicApplicationBase):
 
     def go(self):
         return self._mico["left.x"].move_to(self._to_um)
+
+
+class Mute(Declared):
+    @stream(Rule.ALL)
+    def on_heard(self, receiver):
+        return lambda: None
+
+
+class Unserved(Heater):
+    @property
+    def interface(self):
+        return Mute()
 
 
 class Shrug(CollisionCallbackBase):
@@ -115,6 +134,7 @@ def export_rows(recording, path, progress=None, *, overwrite=False):
     return path
 
 
+UNSERVED = ApplicationBackend(Unserved, options=Options)
 HEATER = ApplicationBackend(Heater, options=Options)
 SHRUG = ContactBackend(lambda options, context: Shrug())
 ROWS = ExporterBackend(lambda options, context: export_rows)
@@ -178,6 +198,24 @@ def test_a_fourth_application_moves_through_the_gate_beside_the_three(laboratory
             rig.application("broken")
         with pytest.raises(cosmic.NotAvailable, match="heater"):
             rig.application("cooler")
+
+
+def test_an_application_whose_declaration_is_wrong_is_not_served_and_the_others_are(
+    laboratory: Edit, caplog: pytest.LogCaptureFixture
+) -> None:
+    folder = laboratory(
+        (APPLICATIONS, 'applications = ["mico", "unserved"]'),
+        ("[mico]\n", "[application.unserved]\nto_um = 25.0\n\n[mico]\n"),
+    )
+    platform = build_platform(folder)
+    with Rig(platform):
+        how = serving(
+            NetworkSettings(), "lab", platform.path, listen=f"tcp/127.0.0.1:{free_port()}"
+        )
+        StationHost(platform, how).close()
+    (said,) = (each.getMessage() for each in caplog.records if "not served" in each.getMessage())
+    assert "application unserved" in said
+    assert "Mute.on_heard cannot be a stream: it takes one receiver, annotated as" in said
 
 
 def test_a_check_reads_the_options_of_all_that_is_named(

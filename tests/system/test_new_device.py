@@ -9,9 +9,11 @@ from xml.etree import ElementTree
 
 import pytest
 
+from contract.station_rig import free_port
 from cosmic.app.cli import main
 from cosmic.app.commands.new_device import KINDS, write_package
 from cosmic.frame.errors import ConfigError
+from system.served_program import served_program
 
 ROOT = Path(__file__).resolve().parents[2]
 NAME = "my_thing"
@@ -149,9 +151,13 @@ with cosmic.connect({str(file)!r}, applications=("mico",), rate=5) as rig:
     assert ran.stdout.split()[-2:] == ["40", "60"]
 
 
-def test_the_how_to_of_an_application_and_a_contact_response_works(tmp_path: Path) -> None:
+def nudge_package(tmp_path: Path) -> tuple[Path, dict[str, str], str, str]:
+    """Install what the how-to of an own application writes.
+
+    Returns the platform file, the environment, and the scripts for here and for elsewhere.
+    """
     page = (ROOT / "docs" / "how-to" / "your-own-application.md").read_text(encoding="utf-8")
-    code, script = re.findall(r"```py\n(.*?)```", page, re.DOTALL)
+    code, script, elsewhere = re.findall(r"```py\n(.*?)```", page, re.DOTALL)
     points, platform = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     package = tmp_path / "nudge"
     package.mkdir()
@@ -168,6 +174,11 @@ def test_the_how_to_of_an_application_and_a_contact_response_works(tmp_path: Pat
     named, rest = platform.removeprefix("[platform]\n").split("\n", 1)
     text = text.replace('applications = ["mico", "daqco", "vico"]', named, 1)
     file.write_text(text.replace("[mico.defaults]", f"{rest}\n[mico.defaults]", 1), "utf-8")
+    return file, environment, script, elsewhere
+
+
+def test_the_how_to_of_an_application_and_a_contact_response_works(tmp_path: Path) -> None:
+    _, environment, script, _ = nudge_package(tmp_path)
     touch = """
     import nudge
     before = len(nudge.Soft.seen)
@@ -185,3 +196,24 @@ def test_the_how_to_of_an_application_and_a_contact_response_works(tmp_path: Pat
     )
     assert ran.returncode == 0, ran.stderr
     assert ran.stdout.split()[-1:] == ["0"]
+
+
+def test_the_application_of_the_how_to_is_used_from_another_process(tmp_path: Path) -> None:
+    file, environment, _, elsewhere = nudge_package(tmp_path)
+    line = free_port()
+    variables = {"PYTHONPATH": environment["PYTHONPATH"]}
+    more = ("--config", str(file), "--name", "lab", "--rate", "20")
+    with served_program(tmp_path, free_port(), line, *more, variables=variables) as served:
+        ran = subprocess.run(
+            [sys.executable, "-c", elsewhere.replace("7447", str(line))],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert ran.returncode == 0, ran.stderr
+        assert "1" in ran.stdout.split()  # the count; what was streamed may come before or after
+        served.http.post("/api/control")
+        assert served.http.post("/api/nudge/nudge", params={"wait": 20}).status_code == 200

@@ -20,6 +20,7 @@ from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun, RunState
 from cosmic.daqco.api.daqco import Daqco, daqco_of
 from cosmic.frame.arguments import check_named, checked_class
+from cosmic.frame.declaration import Declared
 from cosmic.frame.errors import NotAvailable
 from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.vico.api.vico import Vico, vico_of
@@ -131,8 +132,15 @@ class Rig:
             raise NotAvailable("mico is not hosted here; a control loop needs axes")
         return self._control
 
-    def application(self, name: str) -> Any:
+    def application(self, name: str, kind: type[Declared] | None = None) -> Any:
         """Return an application of another package, as it offers itself to scripts.
+
+        Parameters
+        ----------
+        name : str
+            What the platform file calls it.
+        kind : type or None
+            What it declares, to use one that runs at a station.
 
         Raises
         ------
@@ -143,10 +151,14 @@ class Rig:
             return self._platform.others[name].interface
         if name in self._platform.failed:
             raise NotAvailable(self._platform.failed[name])
+        if kind is not None:
+            found = self._platform.remote.brought(name, kind, self._platform.policy)
+            if found is not None:
+                return found
         there = ", ".join(self._platform.others) or "none"
         raise NotAvailable(
             f"application {name!r} is not hosted here; name it in [platform] applications of the "
-            f"platform file. Others that are: {there}"
+            f"platform file. Others that are: {there}. One of a station needs `kind`, its class"
         )
 
     def campaign(

@@ -33,6 +33,7 @@ UNKNOWN: Final = object()
 """Stands for a value that is not known."""
 _MARK: Final = "__cosmic_declared__"
 _OWN: Final = "self"
+_ONE_RECEIVER: Final = "it takes one receiver, annotated as Callable[[WHAT], object]"
 WANTED: Final = "wanted"
 """Parameter of a stream that looks whether anybody receives it."""
 _lock: Final = Lock()
@@ -447,10 +448,10 @@ def result_of(kind: Any) -> Any:
 def _payload(where: str, hints: dict[str, Any]) -> Any:
     receivers = [each for name, each in hints.items() if name not in ("return", WANTED)]
     if len(receivers) != 1 or get_origin(receivers[0]) is not Callable:
-        raise TypeError(f"{where} cannot be a stream: it takes one receiver")
+        raise TypeError(f"{where} cannot be a stream: {_ONE_RECEIVER}")
     taken = get_args(receivers[0])[0]
     if not isinstance(taken, list) or len(taken) != 1:
-        raise TypeError(f"{where} cannot be a stream: its receiver takes one payload")
+        raise TypeError(f"{where} cannot be a stream: {_ONE_RECEIVER}")
     _let_travel(where, taken[0])
     return taken[0]
 
@@ -468,9 +469,15 @@ def _part(where: str, name: str, hints: dict[str, Any]) -> PartDeclaration:
     return PartDeclaration(name, kind, keyed, optional)
 
 
+def _annotation(annotation: Any) -> str:
+    if annotation is None:
+        return "its annotation is missing"
+    return f"{annotation} cannot be checked when it travels"
+
+
 def _let_travel(where: str, annotation: Any) -> None:
     if annotation is None or not can_check(annotation):
-        raise TypeError(f"{where} cannot be declared: {annotation} cannot be checked")
+        raise TypeError(f"{where} cannot be declared: {_annotation(annotation)}")
     let_travel(annotation)
 
 

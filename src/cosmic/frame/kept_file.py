@@ -3,6 +3,7 @@
 import errno
 import math
 import os
+import stat
 from collections.abc import Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
@@ -19,6 +20,8 @@ PART: Final = ".part"
 def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file; the old one stays whole until the new one is on the disk.
 
+    A link stays, and what it leads to is written. Who may read the file stays as it was.
+
     Parameters
     ----------
     content : str or bytes
@@ -27,15 +30,19 @@ def write_whole(path: Path, content: str | bytes) -> None:
     Raises
     ------
     OSError
-        It cannot be written there, its folder is missing, or UTF-8 has no such characters; nothing
-        of it is left.
+        It cannot be written there, it is read-only, its folder is missing, or UTF-8 has no such
+        characters; nothing of it is left.
     """
+    path = Path(os.path.realpath(path))
     part = path.with_name(path.name + PART)
+    mode = _mode_of(path)
     text = isinstance(content, str)
     if isinstance(content, str):
         _check_encodable(content, path)
     try:
         with part.open("w" if text else "wb", encoding="utf-8" if text else None) as file:
+            if mode is not None:
+                part.chmod(mode)  # before there is anything to be read
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
@@ -44,6 +51,17 @@ def write_whole(path: Path, content: str | bytes) -> None:
         with suppress(OSError):
             part.unlink(missing_ok=True)
         raise
+
+
+def _mode_of(path: Path) -> int | None:
+    """Return who may do what with a file that is there, None without one; raises `OSError`."""
+    try:
+        mode = stat.S_IMODE(path.stat().st_mode)
+    except FileNotFoundError:
+        return None
+    if not os.access(path, os.W_OK):  # its folder would let it be replaced all the same
+        raise PermissionError(errno.EACCES, "it is read-only", str(path))
+    return mode
 
 
 def _check_encodable(text: str, path: Path) -> None:

@@ -92,6 +92,20 @@ def test_the_exit_code_is_0_only_when_it_did_what_was_asked(
     assert "so it was" in (printed.err if code else printed.out)
 
 
+@pytest.mark.parametrize("name", ["a file", "a file/inner", "x" * 300])
+def test_a_folder_that_cannot_be_is_refused_before_a_platform_is_started(
+    recipe: Path,
+    tmp_path: Path,
+    platforms: SimpleNamespace,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+) -> None:
+    (tmp_path / "a file").touch()
+    assert main(["campaign", str(recipe), "--out", str(tmp_path / name)]) == 1
+    assert "name another folder" in capsys.readouterr().err
+    assert not platforms.seeds
+
+
 def test_a_campaign_that_ended_without_its_standard_did_not_do_what_was_asked(
     recipe: Path,
     tmp_path: Path,

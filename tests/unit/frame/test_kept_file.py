@@ -1,6 +1,9 @@
 """What the program writes as TOML is what a reader of TOML finds."""
 
 import math
+import os
+import stat
+import sys
 import tomllib
 from datetime import UTC, datetime
 from pathlib import Path
@@ -62,3 +65,26 @@ def test_a_text_that_no_file_can_have_leaves_the_old_file_and_nothing_else(tmp_p
         write_whole(path, "title \udc80")
     assert [each.name for each in tmp_path.iterdir()] == ["a.toml"]
     assert path.read_text(encoding="utf-8") == "old"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links and modes are those of POSIX")
+def test_a_link_stays_and_so_does_who_may_read_what_it_leads_to(tmp_path: Path) -> None:
+    kept, link = tmp_path / "kept.toml", tmp_path / "link.toml"
+    kept.write_text("token = 1", encoding="utf-8")
+    kept.chmod(0o600)
+    link.symlink_to(kept.name)
+    write_whole(link, "token = 2")
+    assert link.is_symlink()
+    assert kept.read_text(encoding="utf-8") == "token = 2"
+    assert stat.S_IMODE(kept.stat().st_mode) == 0o600
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write all")
+def test_a_file_that_is_read_only_stays_as_it_is(tmp_path: Path) -> None:
+    kept = tmp_path / "kept.toml"
+    kept.write_text("a = 1", encoding="utf-8")
+    kept.chmod(0o444)
+    with pytest.raises(PermissionError, match="read-only"):
+        write_whole(kept, "a = 2")
+    assert kept.read_text(encoding="utf-8") == "a = 1"
+    assert list(tmp_path.iterdir()) == [kept]

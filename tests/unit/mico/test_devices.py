@@ -1,8 +1,11 @@
+import threading
+
 import pytest
 
 import cosmic
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceError, DeviceFault
+from cosmic.frame.threads import running_threads
 from cosmic.mico.core.mode import Mode
 from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander
 from cosmic.mico.core.motion.positioner import Status
@@ -152,6 +155,28 @@ def test_closing_while_moving_stops_and_ends_the_movement():
             movement.wait(1)
         with pytest.raises(cosmic.MoveRefused):
             rig["d0.c0"].move_to(1.0)
+
+
+def test_a_listener_that_hangs_in_the_library_is_left_behind_and_keeps_it_from_being_opened():
+    with mico() as (rig, controller):
+        held, go_on = threading.Event(), threading.Event()
+        receive = controller.receive
+
+        def never(device, timeout_s):
+            held.set()
+            go_on.wait(30.0)
+            return receive(device, timeout_s)
+
+        controller.receive = never
+        assert held.wait(5.0)
+        try:
+            with pytest.raises(cosmic.CosmicError, match="listener 0 still hangs in the library"):
+                rig.rescan()
+        finally:
+            go_on.set()
+        wait_until(lambda: not any("listener" in each.name for each in running_threads()))
+        rig.rescan()
+        assert rig["d0.c0"].move_to(5.0) == 5.0
 
 
 def test_a_commander_hears_and_commands_only_what_it_was_connected_for():

@@ -8,7 +8,14 @@ import pytest
 import cosmic
 from cosmic.frame.errors import DeviceError, DeviceFault, UnknownAxisError
 from cosmic.mico.core.motion.positioner import Confidence, Status
-from cosmic.mico.hw.interface import Activity, Channel, PositionerKind
+from cosmic.mico.hw.interface import (
+    Activity,
+    Channel,
+    PositionerKind,
+    PositionerType,
+    ReferenceKind,
+    TypeRead,
+)
 from unit.mico.rigs import mico, wait_until
 
 X = Channel(0, 0)
@@ -196,6 +203,19 @@ def test_an_unknown_position_needs_consent_or_a_reference():
         assert axis.confidence is Confidence.KNOWN
 
 
+def test_an_unknown_axis_without_a_reference_is_not_sent_to_the_initialisation():
+    def power_up(controller):
+        controller.known = False
+        controller.ask_type = lambda channel: controller.emit(
+            TypeRead(channel, PositionerType(0, "own", PositionerKind.LINEAR, ReferenceKind.NONE))
+        )
+
+    with mico(("L",), prepare=power_up) as (rig, _):
+        with pytest.raises(cosmic.MoveRefused, match="no reference to look for; give consent"):
+            rig["d0.c0"].move_to(10.0)
+        assert rig["d0.c0"].move_to(10.0, consent=True) == 10.0
+
+
 def test_initialise_references_in_the_configured_order_and_takes_the_start_pose():
     def power_up(controller):
         controller.known = False
@@ -305,6 +325,25 @@ def test_standing_short_of_the_target_is_a_failure():
         controller.end(X, 50.0)
         with pytest.raises(DeviceError, match=r"stopped at 50\.0 µm instead of 100\.0 µm"):
             movement.wait(3)
+
+
+def test_an_axis_that_says_too_early_that_it_is_stationary_is_stopped():
+    with mico(instant=False) as (rig, controller):
+        movement = rig["d0.c0"].move_to(100.0, wait=False)
+        wait_until(lambda: controller.of("move_to"))
+        controller.end(X, 3.0)
+        with pytest.raises(DeviceError, match=r"stopped at 3.0 µm instead of 100.0 µm"):
+            movement.wait(5)
+        assert ("stop", X) in controller.calls
+
+
+def test_an_axis_that_moves_without_an_order_is_stopped_and_says_so():
+    with mico() as (rig, controller):
+        controller.activity[X] = Activity.TARGETING
+        wait_until(lambda: ("stop", X) in controller.calls)
+        wait_until(lambda: "without an order" in (rig["d0.c0"].details.error or ""))
+        assert rig["d0.c0"].move_to(5.0) == 5.0
+        assert not rig["d0.c0"].details.error
 
 
 def test_a_channel_that_makes_no_progress_is_stopped():

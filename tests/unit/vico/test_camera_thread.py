@@ -2,6 +2,7 @@
 
 import itertools
 import logging
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -41,6 +42,7 @@ class OddCamera(BaseCamera):
         super().__init__(info, WALL, closed=None)
         self.data: Any = GREY
         self.pixel_format = PixelFormat.MONO8
+        self.ahead_s = 0.0
         self._numbers = itertools.count()
         self._in_force = CameraSettings(0.001, 0.0, 100.0, Roi(0, 0, WIDTH, HEIGHT))
         self._opened((WIDTH, HEIGHT))
@@ -67,7 +69,10 @@ class OddCamera(BaseCamera):
         if self._stopping.wait(0.01):
             return None
         now_s = WALL.now_s()
-        return Frame(self.data, next(self._numbers), now_s, now_s, pixel_format=self.pixel_format)
+        exposed_s = now_s + self.ahead_s
+        return Frame(
+            self.data, next(self._numbers), now_s, exposed_s, pixel_format=self.pixel_format
+        )
 
     @override
     def _end(self) -> None: ...
@@ -170,3 +175,15 @@ class Suite(CameraContract):
     @override
     def make_library(self) -> Any:
         raise NotImplementedError
+
+
+@pytest.mark.parametrize("ahead_s", [math.nan, math.inf, -math.inf, 1.0e9])
+def test_an_image_of_no_time_or_of_the_future_is_refused_with_the_reason(
+    ahead_s: float, bench: Bench
+) -> None:
+    bench.camera.ahead_s = ahead_s
+    assert wait_until(lambda: bench.thread.problem)
+    with pytest.raises(NotAvailable, match=r"that was exposed at .* s\. It is refused"):
+        bench.thread.next_image(WALL.now_s(), 0.1)
+    bench.camera.ahead_s = 0.0
+    assert wait_until(lambda: not bench.thread.problem)

@@ -12,7 +12,7 @@ from typing import Final, TextIO
 from cosmic.app.commands.chosen_rig import chosen_rig
 from cosmic.app.panels.campaign.output import gui_application, write_output
 from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
-from cosmic.autonomy.campaign.opening import read_recipe, recorded
+from cosmic.autonomy.campaign.opening import check_folder, read_recipe, recorded
 from cosmic.autonomy.campaign.plates import confirmed
 from cosmic.autonomy.campaign.recipe import Recipe
 from cosmic.autonomy.campaign.records import TWIN
@@ -39,6 +39,7 @@ def run(chosen: argparse.Namespace) -> int:
         The recipe, the configuration or the folder is wrong; nothing has moved.
     """
     recipe = read_recipe(chosen.recipe)
+    check_folder(chosen.out)
     application = gui_application()  # noqa: F841 - Qt forgets one that nobody holds
     twin = recipe.file.twin
     rate = twin.rate if chosen.rate is None else chosen.rate

@@ -6,6 +6,7 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -77,7 +78,7 @@ def run(chosen: argparse.Namespace) -> int:
     folder: Path = chosen.output or Path("measured")
     _check_apart(folder, chosen.images)
     files = found_files(_without_results(chosen.images, folder))
-    _prepare(folder, files, overwrite=chosen.overwrite)
+    made = _prepare(folder, files, overwrite=chosen.overwrite)
     results = Results()
     try:
         ended = _measured_all(files, folder, chosen, results)
@@ -85,6 +86,8 @@ def run(chosen: argparse.Namespace) -> int:
         if results.measured:  # else they would be in the way of the next run
             with held_back():  # a second signal, as `timeout` sends, leaves no half
                 _write_tables(folder, results, spatial=chosen.focal_stack)
+        else:
+            _remove_empty(made)
     text = summary(results.measured, len(results.refused), len(results.pages_refused))
     where = f"{folder}\n" if results.measured else ""
     sys.stdout.write(encoded(f"{text}{where}").decode())
@@ -177,15 +180,20 @@ def _without_results(chosen: Sequence[Path], folder: Path) -> list[Path]:
     """Leave out results of an earlier run that a pattern such as ``*.png`` named as well."""
     if not (folder / WHOLE).exists():
         return list(chosen)
-    apart = folder.resolve()
+    apart = _real(folder)
     kept = [
         each
         for each in chosen
-        if not (OF_AN_IMAGE.fullmatch(each.name) and each.parent.resolve() == apart)
+        if not (OF_AN_IMAGE.fullmatch(each.name) and _real(each.parent) == apart)
     ]
     if len(kept) < len(chosen):
         _say(f"{folder}: results of an earlier run left out: {len(chosen) - len(kept)}")
     return kept
+
+
+def _real(path: Path) -> Path:
+    """Return what links lead to; links in a circle are refused where they are read."""
+    return Path(os.path.realpath(path))
 
 
 def _is_folder(path: Path) -> bool:
@@ -323,13 +331,24 @@ def _measured_stack(file: Path, folder: Path, stem: str, chosen: argparse.Namesp
 def _check_apart(folder: Path, chosen: Sequence[Path]) -> None:
     """Refuse results among the images: the next run would measure overlays as images."""
     for each in chosen:
-        if _is_folder(each) and each.resolve() == folder.resolve():
+        if _is_folder(each) and _real(each) == _real(folder):
             raise RecordingError(f"{folder}: holds the images; choose another folder with --output")
 
 
-def _prepare(folder: Path, files: Sequence[Path], *, overwrite: bool) -> None:
-    """Make the folder, without results of an earlier run; these go only where that is said."""
+def _remove_empty(folders: Sequence[Path]) -> None:
+    """Remove folders that were made for results of which there are none, the innermost first."""
+    with suppress(OSError):  # something else is in it now
+        for each in folders:
+            each.rmdir()
+
+
+def _prepare(folder: Path, files: Sequence[Path], *, overwrite: bool) -> tuple[Path, ...]:
+    """Make the folder, without results of an earlier run; these go only where that is said.
+
+    Returns the folders that were not there, the innermost first.
+    """
     try:
+        missing = tuple(each for each in (folder, *folder.parents) if not each.exists())
         folder.mkdir(parents=True, exist_ok=True)
         names = (TABLE, WHOLE, NETWORKS, REPORT)
         there = sorted(
@@ -343,10 +362,11 @@ def _prepare(folder: Path, files: Sequence[Path], *, overwrite: bool) -> None:
         raise RecordingError(
             f"{there[0]}: exists; choose another folder with --output, or say --overwrite"
         )
-    images = {each.resolve() for each in files}
+    images = {_real(each) for each in files}
     try:
         for each in there:
-            if each.resolve() not in images:
+            if _real(each) not in images:
                 each.unlink()
     except OSError as exc:
         raise RecordingError(f"{folder}: cannot be cleared ({exc.strerror or exc})") from exc
+    return missing

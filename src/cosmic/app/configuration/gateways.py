@@ -8,7 +8,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from cosmic.frame.config import StrictModel
+from cosmic.frame.config import StrictModel, check_model
 from cosmic.frame.errors import ConfigError
 
 DEFAULT_PORT: Final = 8470
@@ -99,7 +99,7 @@ def doors(
     Raises
     ------
     ConfigError
-        An address is none, or reaches beyond this computer without what guards it.
+        An address or a prefix is none, or reaches beyond this computer without what guards it.
     """
     token = ""
     chosen = http.model_copy(update={"listen": listen}) if listen else http
@@ -109,7 +109,8 @@ def doors(
             token = secrets.token_urlsafe(24)
             anybody = HttpClient(name="http", token=token, access="move")
             chosen = chosen.model_copy(update={"client": (anybody,)})
-    records = EpicsSettings.model_validate({**epics.model_dump(), "prefix": prefix or epics.prefix})
+    given = {**epics.model_dump(), "prefix": prefix or epics.prefix}
+    records = check_model("--epics", given, EpicsSettings)
     return Doors(chosen if chosen.listen else None, records if records.prefix else None, token)
 
 

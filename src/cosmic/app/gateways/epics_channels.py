@@ -101,7 +101,10 @@ def number(
 
 
 def whole(value: int = 0, *, put: Put | None = None, otherwise: int | None = None) -> Channel:
-    """Return a channel with a whole number; `otherwise` stands for what is written and is none."""
+    """Return a channel with a whole number.
+
+    `otherwise` stands for what is written and is none, or is cut to 0.
+    """
     return _guarded(caproto.ChannelInteger(value=value), put, otherwise)
 
 
@@ -201,6 +204,8 @@ def _guarded(channel: Channel, put: Put | None, otherwise: object = None) -> Cha
                 if otherwise is None:
                     raise
                 value = otherwise
+            if otherwise is not None and value == 0 and _is_more_than_zero(data):
+                value = otherwise  # what was cut off on the way to a whole number
             await put(who, value)
         except (CosmicError, PutRefused) as exc:
             logger.info("EPICS: %s of %s: a write was refused: %s", who.user, who.host, exc)
@@ -212,6 +217,14 @@ def _guarded(channel: Channel, put: Put | None, otherwise: object = None) -> Cha
 
     channel.auth_write = auth_write
     return channel
+
+
+def _is_more_than_zero(data: Any) -> bool:
+    """Return whether numbers that were written are not all 0."""
+    try:
+        return any(float(each) != 0.0 for each in data)
+    except (TypeError, ValueError):
+        return False
 
 
 def _value(channel: Channel, data: Any, data_type: Any) -> Any:

@@ -16,7 +16,7 @@ from cosmic.app.platform import Platform
 from cosmic.app.stations.facts import ITSELF, StationFacts, StationSide
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
-from cosmic.frame.declaration import Declared
+from cosmic.frame.declaration import Declared, declaration_of
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.errors import StationAway
@@ -195,9 +195,19 @@ def _sides(platform: Platform) -> dict[str, object]:
             sides[name] = Host(name, Vico(application))
         else:
             offered = application.interface
-            if isinstance(offered, Declared):
+            if isinstance(offered, Declared) and _can_be_served(name, offered):
                 sides[name] = Host(name, offered)
     return sides
+
+
+def _can_be_served(name: str, offered: Declared) -> bool:
+    """Return whether what an application of another package declares can travel."""
+    try:
+        declaration_of(type(offered))
+    except TypeError as exc:  # the others are served without it
+        logger.error("application %s is not served: %s", name, exc)
+        return False
+    return True
 
 
 def _facts(platform: Platform, applications: tuple[str, ...]) -> StationFacts:

@@ -4,7 +4,8 @@ import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from threading import Lock
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from cosmic.app.configuration.platform_file import KNOWN_APPLICATIONS
 from cosmic.app.stations.address import StationAddress, remember_stations
@@ -14,12 +15,14 @@ from cosmic.frame.application import GuiFactory
 from cosmic.frame.declaration import Declared
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.network.application import RemoteApplication
+from cosmic.frame.network.application import RemoteApplication, remote_api
 from cosmic.mico.api.client import MicoClient
 from cosmic.vico.api.vico import Vico
 
 if TYPE_CHECKING:
     from cosmic.frame.network.line_settings import Certificates
+
+D = TypeVar("D", bound=Declared)
 
 _DECLARED: Final[Mapping[str, tuple[str, type[Declared]]]] = {
     "daqco": ("DAQCo", Daqco),
@@ -42,6 +45,8 @@ class RemoteApplications:
 
     stations: tuple[RemoteStation, ...] = ()
     host_of: Mapping[str, RemoteStation] = field(default_factory=dict)
+    _brought: dict[str, RemoteApplication[Any]] = field(default_factory=dict)
+    _lock: Lock = field(default_factory=Lock)
 
     def application(self, name: str, policy: FailurePolicy, gui: GuiFactory | None) -> Any:
         """Return the application of that name as it is used from here; None if it is not there."""
@@ -55,11 +60,33 @@ class RemoteApplications:
             )
         return MicoClient(station.transport, policy, gui_factory=gui)
 
+    def brought(self, name: str, kind: type[D], policy: FailurePolicy) -> D | None:
+        """Return what an application of another package offers at a station; None if none hosts it.
+
+        Raises
+        ------
+        TypeError
+            Something that `kind` declares cannot be checked.
+        """
+        hosts = (each for each in self.stations if name in each.facts.applications)
+        station = next(hosts, None)
+        if station is None or name in KNOWN_APPLICATIONS:
+            return None
+        with self._lock:
+            made = self._brought.get(name)
+            if made is None:
+                made = RemoteApplication(name, kind, station.transport, policy, name=name)
+                self._brought[name] = made
+                made.initialize()
+        return remote_api(made, kind)
+
     def close(self) -> None:
         """End every line; any state."""
         with ExitStack() as at_end:
             for station in self.stations:
                 at_end.callback(station.close)
+            for application in self._brought.values():
+                at_end.callback(application.shut_down)
 
 
 def open_stations(

@@ -1,5 +1,6 @@
 """Beginning a campaign in a folder, or going on with the one that is there."""
 
+import os
 from collections.abc import Callable, Collection, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -253,6 +254,25 @@ def _force_scale(settings: Mapping[str, Any], channel: str) -> str:
 
 def _platform(hardware: str) -> str:
     return f"the {TWIN}" if hardware == TWIN else f"the platform {hardware}"
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse a folder that a campaign cannot be written to, before a platform is started for it.
+
+    Raises
+    ------
+    CampaignError
+        It is none, or may not be written to; the text says which.
+    """
+    whole = folder.absolute()
+    try:
+        there = next(each for each in (whole, *whole.parents) if each.exists())
+    except (OSError, ValueError) as exc:
+        raise CampaignError(f"{folder} cannot be made: {exc}; name another folder") from exc
+    if not there.is_dir():
+        raise CampaignError(f"{folder}: {there} is no folder; name another folder")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise CampaignError(f"{folder}: {there} may not be written to; name another folder")
 
 
 def recorded(folder: Path) -> CampaignInfo | None:

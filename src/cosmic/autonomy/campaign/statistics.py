@@ -12,6 +12,9 @@ from scipy.special import stdtrit  # scipy.stats takes a second to load
 from cosmic.autonomy.bending.result import BendingResult, combined_std_ln
 from cosmic.autonomy.campaign.records import FINISHED, FibreRecord, Outcome
 
+MANY: Final = 10_000
+"""Fibres from which on their spread is as good as known."""
+
 SECONDS_AN_HOUR: Final = 3600.0
 CONFIDENCE: Final = 0.975
 TWO_SIDED: Final = 1.96
@@ -152,12 +155,17 @@ def fibres_needed(mean: MeanEi, precision_percent: float) -> float:
     if mean.count < 2:
         return math.nan
     half, shared = math.log1p(precision_percent / 100.0), TWO_SIDED * mean.common_std_ln
-    if shared >= half:
+    left = half**2 - shared**2
+    if shared >= half or left == 0.0:  # as of a half width whose square is no number any more
         return math.inf
-    room = math.sqrt(half**2 - shared**2)
-    needed = max(math.ceil((TWO_SIDED * mean.spread_ln / room) ** 2), 2)
+    least = (TWO_SIDED * mean.spread_ln) ** 2 / left
+    if not math.isfinite(least):
+        return math.inf
+    needed, room = max(math.ceil(least), 2), math.sqrt(left)
     # The fewer there are the less is known of their spread: as `mean_ei` counts it.
-    while float(stdtrit(needed - 1, CONFIDENCE)) * mean.spread_ln > room * math.sqrt(needed):
+    while needed < MANY and (
+        float(stdtrit(needed - 1, CONFIDENCE)) * mean.spread_ln > room * math.sqrt(needed)
+    ):
         needed += 1
     return needed
 

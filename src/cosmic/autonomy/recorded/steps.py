@@ -1,7 +1,6 @@
 """What a recorded procedure consists of: steps as data, as a readable file, and as Python."""
 
 import json
-import tomllib
 from pathlib import Path
 from typing import Annotated, Final, Literal, Self
 
@@ -10,7 +9,7 @@ from pydantic import Field, ValidationError, model_validator
 from typing_extensions import override
 
 from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation
-from cosmic.frame.config import StrictModel
+from cosmic.frame.config import StrictModel, read_toml
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.kept_file import write_whole
 
@@ -254,11 +253,7 @@ def load_recorded(path: Path) -> RecordedProcedure:
     ConfigError
         It cannot be read, or is no recorded procedure; the text names the key.
     """
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as exc:  # ValueError: no text, no TOML, or no path
-        raise ConfigError(f"{path}: {exc}") from exc
-    return _checked(data, str(path))
+    return _checked(read_toml(path), str(path))
 
 
 def _checked(data: dict[str, object], where: str) -> RecordedProcedure:
@@ -266,6 +261,8 @@ def _checked(data: dict[str, object], where: str) -> RecordedProcedure:
         return RecordedProcedure.model_validate_json(json.dumps(data))  # tables know no tuples
     except TypeError as exc:  # a date
         raise ConfigError(f"{where}: {exc}") from exc
+    except RecursionError:
+        raise ConfigError(f"{where}: its tables lie too deep") from None
     except ValidationError as exc:
         lines = [
             f"{where}: {'.'.join(str(part) for part in each['loc'])}: {each['msg']}"

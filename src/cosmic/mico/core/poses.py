@@ -12,6 +12,7 @@ from typing import Final
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import Table
 
 from cosmic.frame.config import not_there, read_toml
 from cosmic.frame.errors import ConfigError, NotAvailable
@@ -131,11 +132,19 @@ def read_poses(path: Path) -> dict[str, Pose]:
         if not NAME.fullmatch(name) or not isinstance(table, dict) or not table:
             raise ConfigError(f"{path}: {name}: is no pose: [name] and a position for each axis")
         for axis, value in table.items():
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not number or not math.isfinite(value):
+            if not _is_position(value):
                 raise ConfigError(f"{path}: {name}.{axis}: {reprlib.repr(value)} is no position")
         poses[name] = Pose(name, {axis: float(value) for axis, value in table.items()})
     return poses
+
+
+def _is_position(value: object) -> bool:
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number that no float can be
+        return False
 
 
 def pose_misfits(poses: Mapping[str, Pose], kinds: Mapping[str, str]) -> list[str]:
@@ -164,11 +173,13 @@ def _replaced(text: str, name: str, pose: Pose | None) -> str:
     """Return `text` with the section of one pose replaced, added, or taken out."""
     document = tomlkit.parse(text)
     section = document.get(name)
+    rest = _cut_tail(section) if isinstance(section, Table) else ""
     if section is not None and (pose is None or not isinstance(section, MutableMapping)):
+        rest = _hand_on(document, name, rest)
         document.remove(name)
         section = None
     if pose is None:
-        return tomlkit.dumps(document)
+        return tomlkit.dumps(document) + rest
     if section is None:
         section = tomlkit.table()
         document.append(name, section)
@@ -176,4 +187,23 @@ def _replaced(text: str, name: str, pose: Pose | None) -> str:
         del section[axis]
     for axis, value in pose.positions.items():
         section[axis] = round(value, 4)
-    return tomlkit.dumps(document)
+    rest = _hand_on(document, name, rest)
+    return tomlkit.dumps(document) + rest
+
+
+def _cut_tail(section: Table) -> str:
+    """Take off what stands below the last position: it is said of what follows."""
+    body, tail = section.value.body, ""
+    while body and body[-1][0] is None:
+        tail = body.pop()[1].as_string() + tail
+    return tail
+
+
+def _hand_on(document: tomlkit.TOMLDocument, name: str, text: str) -> str:
+    """Put `text` before the section that follows, and return it where none does."""
+    names = list(document)
+    after = names[names.index(name) + 1 :]
+    if not after or not isinstance(following := document[after[0]], Table):
+        return text
+    following.trivia.indent = text + following.trivia.indent
+    return ""

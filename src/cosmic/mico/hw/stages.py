@@ -58,6 +58,8 @@ LONGEST_HOLD_S: Final = 59.999
 FARTHEST: Final = 1e8
 """No stage goes so far, in um or degrees."""
 _LONGEST_WAIT_S: Final = 1e6
+_CLOSE_S: Final = 5.0
+"""How long closing waits for a call that does not return."""
 
 LibraryUnit = Literal["m", "mm", "um", "nm", "deg", "mdeg", "step"]
 _PER_UNIT: Final[dict[str, float]] = {
@@ -116,7 +118,10 @@ class StageUnit(Protocol):
 
     @abstractmethod
     def moving(self, axis: int) -> bool:
-        """Return whether it moves."""
+        """Return whether it moves: from the command on, also where it has not begun yet.
+
+        Where its movement has failed, raise one of `errors`.
+        """
 
     @abstractmethod
     def move_to(self, axis: int, target: float) -> None:
@@ -220,16 +225,22 @@ class _Open:
         while self.stops and self.busy.acquire(blocking=False):
             try:
                 while self.stops:
-                    self.unit.stop(self.stops.popleft())
-            except Exception as exc:
-                fault, text = self._meant(exc)
-                said = f"{where(self.index)}: a stop failed: {text}"
-                logger.exception("%s", said)
-                failed = DeviceError(said, fault=fault, device=self.index)
-                self.events.append(Failed(None, failed))
+                    failed = self._stop(self.stops.popleft()) or failed
             finally:
                 self.busy.release()
         return failed
+
+    def _stop(self, axis: int) -> DeviceError | None:
+        try:
+            self.unit.stop(axis)
+        except Exception as exc:
+            fault, text = self._meant(exc)
+            said = f"{where(self.index, axis)}: a stop failed: {text}"
+            logger.exception("%s", said)
+            failed = DeviceError(said, fault=fault, device=self.index, channel=axis)
+            self.events.append(Failed(Channel(self.index, axis), failed))
+            return failed
+        return None
 
     def wake(self) -> None:
         """Have the thread that receives look again."""
@@ -362,8 +373,17 @@ class StageController(Controller):
         with self._lifecycle:
             devices, self._devices = self._devices, ()
             for device in devices:
-                with device.busy:
-                    _close(device.unit)
+                if device.busy.acquire(timeout=_CLOSE_S):
+                    try:
+                        _close(device.unit)
+                    finally:
+                        device.busy.release()
+                else:
+                    logger.error(
+                        "%s: a call has not returned for %g s; it is left open",
+                        where(device.index),
+                        _CLOSE_S,
+                    )
                 device.wake()
 
     # What comes back
@@ -395,7 +415,11 @@ class StageController(Controller):
             return
         at.looked_s = now_s
         for axis in list(at.doing):
-            at.look(axis)
+            try:
+                at.look(axis)
+            except DeviceError as exc:
+                at.doing.pop(axis, None)  # from here on it is asked for by whoever wants to know
+                at.events.append(_failed(exc))
 
     def _ask(self, channel: Channel, question: Callable[[], Event]) -> None:
         at = self._at(channel)
@@ -414,11 +438,21 @@ class StageController(Controller):
     @override
     def ask_type(self, channel: Channel) -> None:
         at, axis = self._at(channel), self._axis(channel)
-        found = at.unit.has_reference(channel.channel)
-        kind = ReferenceKind.MARK if found else ReferenceKind.NONE
-        name = f"{self._title}, axis {axis.axis}"
-        positioner = PositionerType(0, name, axis.positioner_kind, kind)
-        self._ask(channel, lambda: TypeRead(channel, positioner))
+
+        def answer() -> Event:
+            kind = ReferenceKind.MARK if self._has_reference(at, channel) else ReferenceKind.NONE
+            name = f"{self._title}, axis {axis.axis}"
+            return TypeRead(channel, PositionerType(0, name, axis.positioner_kind, kind))
+
+        self._ask(channel, answer)
+
+    @staticmethod
+    def _has_reference(at: _Open, channel: Channel) -> bool:
+        return at.call(
+            "asking whether it has a reference",
+            channel.channel,
+            lambda: at.unit.has_reference(channel.channel),
+        )
 
     @override
     def ask_position_known(self, channel: Channel) -> None:
@@ -541,7 +575,7 @@ class StageController(Controller):
     def reference(self, channel: Channel, *, hold_s: float) -> None:
         at, index = self._at(channel), channel.channel
         _check_hold(hold_s, channel)
-        if not at.unit.has_reference(index):
+        if not self._has_reference(at, channel):
             raise unsupported("reference", channel)
         run = partial(at.unit.reference, index)
         self._begin(at, channel, Activity.REFERENCING, run, hold_s=hold_s)
@@ -587,9 +621,14 @@ def _answered(question: Callable[[], Event]) -> Event:
     try:
         return question()
     except DeviceError as exc:
-        if exc.fault is DeviceFault.COMMUNICATION or exc.device is None or exc.channel is None:
-            raise
-        return Failed(Channel(exc.device, exc.channel), exc)
+        return _failed(exc)
+
+
+def _failed(error: DeviceError) -> Event:
+    """Return the failure of one axis as an event; raises `error` when the device is gone."""
+    if error.fault is DeviceFault.COMMUNICATION or error.device is None or error.channel is None:
+        raise error
+    return Failed(Channel(error.device, error.channel), error)
 
 
 def _close(unit: StageUnit) -> None:

@@ -1,6 +1,7 @@
 """`CameraThread`: takes the images of one camera in a thread of its own (thesis 5.2, V1)."""
 
 import logging
+import math
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from threading import Condition, Lock
@@ -53,6 +54,9 @@ def _mismatch(frame: Frame, settings: CameraSettings) -> str:
     """Return how a frame differs from what a camera says of itself; "" where it does not."""
     if not frame.ready:  # a simulated camera's, which looking at would draw
         return ""
+    if not -math.inf < frame.exposed_s <= frame.time_s < math.inf:
+        # Who waits for an image of a time would get an old one, or none.
+        return f"an image came at {frame.time_s!r} s that was exposed at {frame.exposed_s!r} s"
     shape, kind = array_of(settings)
     data = frame.data
     came = (

@@ -131,6 +131,12 @@ def test_what_all_fibres_share_is_in_the_interval_of_their_mean_and_does_not_ave
     assert more[0] < more[1] < more[2] == math.inf
 
 
+@pytest.mark.parametrize("precision_percent", [1e-300, 1e-160, 1e-14])
+def test_a_precision_next_to_nothing_asks_for_no_number_of_fibres(precision_percent: float) -> None:
+    found = mean_ei([4e-11, 5e-11, 6e-11])
+    assert fibres_needed(found, precision_percent) > 1e20
+
+
 def test_a_precision_that_no_number_of_fibres_reaches_is_named_and_foretold_by_no_time() -> None:
     now = progress(some(6, 2), 160.0)
     rule = StopRule(StopSettings(precision_percent=0.1, least=2))

@@ -86,6 +86,8 @@ def test_a_replay_asks_for_what_is_marked_and_takes_other_values() -> None:
         ('name = "a"\n[[step]]\nkind = "pause"\nseconds = 1\nhops = 2\n', "hops"),
         ("name = ", "Invalid value"),
         ("name = 2026-01-01", "date"),
+        (f"name = {'[' * 3000}{']' * 3000}", "too deep"),
+        (f"{'.'.join('a' * 3000)} = 1", "too deep"),
         (
             'name = "a"\n[[step]]\nkind = "record"\nname = "r"\nask = {name = "x"}\n',
             "'name' is no num",

@@ -39,6 +39,20 @@ def test_what_the_user_wrote_into_the_file_stays(tmp_path: Path) -> None:
     assert list(PoseBook(path).poses) == ["b", "c"]
 
 
+def test_what_is_said_above_a_pose_stays_there_when_the_one_before_changes(tmp_path: Path) -> None:
+    path = tmp_path / "poses.toml"
+    others = '# of b\n[b]\n"left.x" = 2.0\n\n# the end\n'
+    path.write_text(f'[a]\n"left.x" = 1.0 # mine\n\n{others}', encoding="utf-8")
+    book = PoseBook(path)
+    book.put(Pose("a", {"left.x": 5.0, "left.z": 3.0}))
+    text = path.read_text(encoding="utf-8")
+    assert text == f'[a]\n"left.x" = 5.0 # mine\n"left.z" = 3.0\n\n{others}'
+    book.remove("a")
+    assert path.read_text(encoding="utf-8").lstrip() == others
+    book.remove("b")
+    assert path.read_text(encoding="utf-8").split("\n")[-2:] == ["# the end", ""]
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -46,6 +60,7 @@ def test_what_the_user_wrote_into_the_file_stays(tmp_path: Path) -> None:
         "a = 1\n",
         "[a]\nx = 'far'\n",
         "[a]\nx = nan\n",
+        f"[a]\nx = 1{'0' * 400}\n",
         "[a]\nx = true\n",
         "[a",
         '["#"]\nx=1\n',

@@ -163,6 +163,17 @@ def test_a_name_that_no_file_can_have_is_refused(
     assert len(rows_of(out / "fibres.csv")) == 1
 
 
+def test_links_in_a_circle_are_refused_and_the_others_measured(
+    image: Path, out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    circle = image.with_name("circle.png")
+    circle.symlink_to(circle.name)
+    assert main(["measure", str(circle), str(image), "--output", str(out)]) == 1
+    assert f"cosmic: {circle}: " in capsys.readouterr().err
+    assert len(rows_of(out / "fibres.csv")) == 1
+    assert main(["measure", str(image), "--output", str(circle)]) == 1
+
+
 @pytest.mark.parametrize("option", ["measure", "--output"])
 def test_an_empty_name_is_refused(
     image: Path, option: str, capsys: pytest.CaptureFixture[str]
@@ -334,6 +345,14 @@ def test_pages_that_differ_in_more_than_height_are_no_focal_stack(
     written(tmp_path / "a.tif")
     with pytest.raises(ConfigError, match=said):
         measure_stack(list(read_images(tmp_path / "a.tif")))
+
+
+def test_a_run_that_measured_nothing_leaves_no_folder_that_it_made(tmp_path: Path) -> None:
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    for folder in (kept, tmp_path / "new" / "inner"):
+        assert main(["measure", str(tmp_path / "nope.png"), "--output", str(folder)]) == 1
+    assert list(tmp_path.iterdir()) == [kept]
 
 
 def test_a_run_that_measured_nothing_is_not_in_the_way_of_the_next(image: Path, out: Path) -> None:

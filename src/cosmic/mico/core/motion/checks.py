@@ -275,11 +275,11 @@ def _position_unknown(state: PositionerState, *, consent: bool) -> MoveVerdict |
         return None
     if state.confidence is not Confidence.UNKNOWN:
         return None
-    return refuse(
-        Reason.POSITION_UNKNOWN,
-        f"{state.name}: its position is unknown; initialise the platform, or give consent",
-        axis=state.name,
-    )
+    found = state.positioner
+    why = "its position is unknown; initialise the platform, or give consent"
+    if found is not None and found.reference is ReferenceKind.NONE:
+        why = "its position is unknown, and it has no reference to look for; give consent"
+    return refuse(Reason.POSITION_UNKNOWN, f"{state.name}: {why}", axis=state.name)
 
 
 def _stale(state: PositionerState, age_s: float, rules: Limits) -> MoveVerdict | None:

@@ -19,7 +19,7 @@ from cosmic.frame.errors import (
     refusal,
 )
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.threads import urgent
+from cosmic.frame.threads import WorkerThread, urgent
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
 from cosmic.mico.core.collision.collision_manager import CollisionManager
@@ -204,11 +204,11 @@ class DeviceThreads:
         self._watch = watch
         self._policy = policy
         self._listeners: dict[int, DeviceListener] = {}
-        self._stuck: list[Device] = []
+        self._stuck: list[WorkerThread] = []
 
     def check_none_hangs(self) -> None:
         """Raise `NotConnectedError` while a thread of an earlier run still uses the library."""
-        stuck = [device.name for device in self._stuck if device.isRunning()]
+        stuck = [thread.name for thread in self._stuck if thread.isRunning()]
         if stuck:
             raise NotConnectedError(
                 f"{', '.join(stuck)} still hangs in the library; start the program again"
@@ -250,15 +250,16 @@ class DeviceThreads:
         self.stop_channels(running)  # past the threads, one of which may hang in the library
         for device in running:
             device.request_end()
-        self._stuck = [device for device in running if not device.join()]
-        for device in self._stuck:
-            logger.error("%s hangs in the library and was left behind", device.name)
+        hang: list[WorkerThread] = [device for device in running if not device.join()]
         self.stop_channels(running)
         for listener in self._listeners.values():
             listener.request_end()
-        for listener in self._listeners.values():
-            listener.join()
+        hang += [listener for listener in self._listeners.values() if not listener.join()]
         self._listeners.clear()
+        # Kept, for Qt aborts the process over a thread that is destroyed while it runs.
+        self._stuck = [each for each in self._stuck if each.isRunning()] + hang
+        for thread in hang:
+            logger.error("%s hangs in the library and was left behind", thread.name)
 
 
 def _stands(channel: tuple[Device, int]) -> bool:

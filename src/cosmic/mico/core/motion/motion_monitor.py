@@ -519,6 +519,8 @@ class MotionMonitor:
         active = self.active
         if not self.settled:
             self._settle(event.activity)
+        elif active is None and number == 0 and not event.activity.at_rest:
+            self._stop_unasked(event.activity)
         if active is None or number != active.order.number or active.jog is not None:
             return
         if not event.activity.at_rest:
@@ -543,6 +545,11 @@ class MotionMonitor:
         self.halt(MoveCancelled(f"{self._name}: stopped"))
         self.ask_activity()
         self.ask_position()
+
+    def _stop_unasked(self, activity: Activity) -> None:
+        """Stop what moves although nobody here asked for it: no gate has seen that movement."""
+        self._note(DeviceError(f"{self._name}: was {activity} without an order; stopped"))
+        self._stop()
 
     def _on_position(self) -> None:
         number = self._status.position_answered()
@@ -615,6 +622,7 @@ class MotionMonitor:
             missed = missed_target(active, state, context.settings)
         if missed is not None:
             self._note(missed)
+            self._stop()  # a device that says too early that it is stationary would go on
         self._release(active.reservation)
         self._conclude(active.error or missed)
 
