@@ -35,6 +35,9 @@ SIGMAS: Final = 3.0
 DEEP_PART: Final = 0.25
 """Of the shortest span: a clamp deeper than that is told."""
 
+DEEPEST_PART: Final = 0.8
+"""Of the deepest clamp that is weighed: what seems to be deeper is at the end of what is known."""
+
 VARIES_FROM: Final = 0.2
 MOSTLY: Final = 0.6
 RELAXES_FROM: Final = 0.04
@@ -88,6 +91,14 @@ def checked(
     if not half <= settings.soft_percent:
         flags.add(Quality.TOO_SOFT)
         reasons.append(f"the interval is +/-{half:.0f} %, more than {settings.soft_percent:g} %")
+    deepest_um = DEEPEST_PART * float(assessed.evidence.depths_um[-1])
+    if _deeper(assessed, deepest_um) > 0.5:
+        flags.add(Quality.CLAMP_DEEP)
+        reasons.append(
+            f"the clamp seems to lie more than {deepest_um:.0f} um behind the tip of the jaws, and "
+            "the interval ends where depths are not weighed any more: something else may make "
+            "short spans soft"
+        )
     used = [result.spans[n] for n in result.used]
     cause = _cause(used, readings, assessed, settings)
     if cause is not None:
@@ -106,6 +117,12 @@ def checked(
         reasons=tuple(reasons),
         notes=frozenset(notes - flags),
     )
+
+
+def _deeper(assessed: Assessed, depth_um: float) -> float:
+    """Return how probable it is that the fibre is clamped deeper than that."""
+    beyond = assessed.evidence.depths_um > depth_um
+    return float(assessed.posterior.weights[beyond].sum())
 
 
 def _apart_um(result: BendingResult, good: Sequence[int]) -> float:

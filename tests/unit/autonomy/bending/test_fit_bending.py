@@ -86,6 +86,15 @@ def test_the_clamp_is_found_behind_the_tip_of_the_jaws() -> None:
     assert found.clamp_offset_std_um < 7.0
 
 
+@pytest.mark.parametrize(("clamp_um", "trusted"), [(120.0, True), (330.0, False)])
+def test_a_clamp_deeper_than_what_is_weighed_is_refused(clamp_um: float, trusted: bool) -> None:
+    instrument = FitSettings(**RIGID, soft_percent=90.0)
+    found = fit_bending(pushed(rig(clamp_um=clamp_um)), settings=instrument)
+    assert found.trusted is trusted
+    assert (Quality.CLAMP_DEEP in found.flags) is not trusted
+    assert any("behind the tip of the jaws" in each for each in found.reasons) is not trusted
+
+
 def test_the_slope_does_not_care_about_an_offset_of_the_nominal_places() -> None:
     spans = pushed(rig())
     moved = [dataclasses.replace(span, nominal_um=span.nominal_um + 6.0) for span in spans]
