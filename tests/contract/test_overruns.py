@@ -12,6 +12,7 @@ from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.api.recording import open_recording
 from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, ScaleSettings
+from cosmic.frame.errors import NotAvailable
 from cosmic.frame.failure import FailurePolicy
 
 SCALE = ScaleSettings(name="Probe", unit="uN", coefficients=(0.0, 20.0))
@@ -99,6 +100,35 @@ def test_acquisition_goes_on_by_itself_and_the_gap_stands_in_the_file(
         (note,) = [each for each in recording.events if each.kind == "overload"]
         assert "computer overloaded" in note.text
     assert not rig.stops, "no limit was armed"
+
+
+@pytest.mark.parametrize("rig", ["NI-DAQmx"], indirect=True)
+def test_a_board_that_says_nothing_any_more_ends_who_waits_for_it(
+    rig: Overrunning, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosmic.daqco.core.udaq_core.SILENT_S", 0.3)
+    rig.daqco.stop()
+    rig.daqco.start()
+    rig.go_on()
+    averaged = rig.daqco["force"].trigger()
+    assert wait_until(lambda: not rig.daqco.running)
+    assert "Dev1: no samples for" in rig.daqco.problem
+    with pytest.raises(NotAvailable, match="Dev1: no samples for"):
+        averaged.wait(5.0)
+    rig.daqco.start()
+    rig.go_on()
+    assert rig.daqco.running
+
+
+@pytest.mark.parametrize("rig", ["simulated"], indirect=True)
+def test_a_simulated_board_gives_nothing_as_long_as_its_clock_waits(
+    rig: Overrunning, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosmic.daqco.core.udaq_core.SILENT_S", 0.1)
+    rig.daqco.stop()
+    rig.daqco.start()
+    assert not wait_until(lambda: not rig.daqco.running, 0.6)
+    rig.go_on()
 
 
 def test_with_a_limit_armed_it_stops_first_and_says_how_much_was_lost(rig: Overrunning) -> None:

@@ -14,13 +14,18 @@ from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.hw.board_group import BoardGroup, ClockAgreement
 from cosmic.daqco.hw.interface import Board, BoardChunk
 from cosmic.daqco.hw.pulses import PulsingBoard
-from cosmic.frame.errors import DeviceError, DeviceFault
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import WorkerThread
 
 logger = logging.getLogger(__name__)
 
 LOOK_S: Final = 0.05
+SILENT_S: Final = 10.0
+"""A real board of which nothing has come for so long, and for some chunks more, has failed."""
+
+SILENT_CHUNKS: Final = 3
 
 
 class UDaqCore(WorkerThread):
@@ -123,11 +128,17 @@ class UDaqCore(WorkerThread):
 
     @override
     def run_body(self) -> None:
+        chunk_s = self.plan.chunk_samples / self.rate_hz
+        silence = _Silence(self._boards, SILENT_S + SILENT_CHUNKS * chunk_s)
         try:
             while not self.end_requested:
                 chunk = self._boards.receive(LOOK_S)
-                if chunk is None or self._given_up:
+                if self._given_up:
                     continue
+                if chunk is None:
+                    silence.look()
+                    continue
+                silence.broken()
                 if not chunk.first_sample:
                     for each in self.agreement:
                         logger.warning("%s", each.text)
@@ -160,3 +171,30 @@ class UDaqCore(WorkerThread):
     def request_end(self) -> None:
         super().request_end()
         self._boards.stop()
+
+
+class _Silence:
+    """For how long real boards have given nothing; a simulated one may wait as its clock does.
+
+    Looks are counted as well: a computer that stood still is not taken for a board that is silent.
+    """
+
+    def __init__(self, boards: BoardGroup, most_s: float) -> None:
+        self._boards, self._most_s = boards, most_s
+        self.broken()
+
+    def broken(self) -> None:
+        """Begin anew, for a chunk came."""
+        self._since_s, self._looks = WALL.now_s(), 0
+
+    def look(self) -> None:
+        """Raise `DeviceTimeout` where it has lasted too long."""
+        self._looks += 1
+        long = self._looks * LOOK_S > self._most_s < WALL.now_s() - self._since_s
+        if not long or not (names := self._boards.silent):
+            return
+        raise DeviceTimeout(
+            f"{', '.join(names)}: no samples for {self._most_s:.3g} s, and no error. Acquisition "
+            f"ended; check cable, sample clock and driver, then start again",
+            fault=DeviceFault.TIMEOUT,
+        )

@@ -84,6 +84,15 @@ class BoardGroup:
         return self._asked
 
     @property
+    def silent(self) -> tuple[str, ...]:
+        """The real boards from which nothing has come that is not handed on yet."""
+        return tuple(
+            board.info.name
+            for number, board in enumerate(self._boards)
+            if number not in self._pieces and not board.info.simulated
+        )
+
+    @property
     def agreement(self) -> tuple[ClockAgreement, ...]:
         """How well the clocks agree that are not one clock; known with the first chunk."""
         return self._agreement
