@@ -1,5 +1,6 @@
 """The window by task: what each workspace shows at each size, and that nothing is cut off."""
 
+import shutil
 import time
 from collections.abc import Callable, Iterable, Iterator
 from datetime import UTC, datetime
@@ -31,6 +32,7 @@ from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.daqco.gui.channel_list import ChannelList
 from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.limit_indicator import LimitIndicator
+from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.stop_button import StopButton
 from cosmic.mico.core.sequence.report import StepState
@@ -38,6 +40,7 @@ from cosmic.mico.gui.initialisation_panel import InitialisationPanel
 from cosmic.vico.api.vico import vico_of
 from cosmic.vico.core.calibration import Plane
 from cosmic.vico.core.calibration_fit import Sighting, fit_map
+from cosmic.vico.gui.record_bar import RecordBar
 from cosmic.vico.hw.peripherals import LensAxis
 from gui.app.windows import Make, mico
 from gui.mico.panels import part, position
@@ -537,6 +540,38 @@ def test_the_log_lies_beside_what_was_recorded(
     qtbot.mouseClick(results.sessions.list.viewport(), LEFT, pos=place)
     qtbot.waitUntil(lambda: results.viewer.pictures.scene is not None)
     assert (tmp_path / "log.tsv").read_text().startswith("time_s\tutc")
+
+
+def test_images_lie_beside_what_was_recorded(
+    make: Make, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    window = make(applications=("mico", "vico"), rate=SLOW)
+    layout = tasks(window)
+    choose(window, qtbot, LOOK)
+    (recorder,) = (each for each in window.findChildren(RecordBar) if each.isVisible())
+    qtbot.waitUntil(recorder.snap.isEnabled, timeout=15_000)
+    qtbot.waitUntil(lambda: "disk lasts" in recorder.message.text())
+    assert not layout.folder.path.exists(), "before anything is written"
+    qtbot.mouseClick(recorder.snap, LEFT)
+    qtbot.waitUntil(lambda: any(layout.folder.path.glob("*.png")), timeout=15_000)
+    (image,) = layout.folder.path.glob("*.png")
+    choose(window, qtbot, "Results")
+    qtbot.waitUntil(lambda: layout.results.sessions.row_of(image.stem) is not None)
+
+
+def test_images_go_where_the_platform_file_says(make: Make, qtbot: QtBot, tmp_path: Path) -> None:
+    config = tmp_path / "config"
+    shutil.copytree(shipped_config_dir(), config)
+    file = config / "platform.toml"
+    text = file.read_text(encoding="utf-8")
+    named = text.replace('[vico]\ndirectory = ""', f'[vico]\ndirectory = "{tmp_path}"')
+    assert named != text
+    file.write_text(named, encoding="utf-8")
+    window = make(applications=("mico", "vico"), rate=SLOW, config=config)
+    recorder = window.findChild(RecordBar)
+    assert recorder is not None
+    assert recorder.files.folder == tmp_path
 
 
 def test_a_force_limit_is_set_by_three_actions(own: OperatorWindow, qtbot: QtBot) -> None:

@@ -43,9 +43,14 @@ class SessionFolder:
         self._folder: Path | None = None
         self.on_made: Callable[[Path], object] | None = None
 
+    @property
+    def path(self) -> Path:
+        """Where it is, or will be."""
+        return self._folder or self.home / self._name
+
     def __call__(self) -> Path:
         """Return it, made now if need be; raises `OSError`."""
-        folder = self._folder or self.home / self._name
+        folder = self.path
         folder.mkdir(parents=True, exist_ok=True)
         self._folder = folder
         if self.on_made is not None:

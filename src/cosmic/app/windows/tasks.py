@@ -202,7 +202,17 @@ class TaskLayout(QObject):
         self._lens_start = LensStart(rig, self)
         self._connect()
 
+    def _keep_images(self) -> None:
+        """Have images go where all of the session goes, unless the platform names a directory."""
+        named = self._platform.file.vico
+        if named is not None and named.directory:
+            return
+        for parts in self._parts.values():
+            if not parts.recorder.files.remote:
+                parts.recorder.files.keep_in(self.folder.path, self.folder)
+
     def _add_panels(self) -> None:
+        self._keep_images()
         add = self._window.add_panel
         add(TOOL, self.tool, _LEFT, scroll=False)
         if self.recorder is not None:

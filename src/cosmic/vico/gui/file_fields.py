@@ -47,6 +47,7 @@ class FileFields(QWidget):
     ) -> None:
         super().__init__(parent)
         self._now, self._station = now, station
+        self._kept: tuple[str, Callable[[], Path]] | None = None
         self.base = tipped(QLineEdit(base), "Base of the file names")
         self.stamp = tipped(QCheckBox("append time"), "Append date and time to each name")
         self.stamp.setChecked(True)
@@ -79,6 +80,30 @@ class FileFields(QWidget):
             self._grid.addWidget(beside, 2 + row, 1, 1, 2)
 
     @property
+    def remote(self) -> bool:
+        """Whether it is the disk of another computer."""
+        return bool(self._station)
+
+    def keep_in(self, directory: Path, make: Callable[[], Path]) -> None:
+        """Name a directory that `make` makes when the first file is written there."""
+        self._kept = str(directory), make
+        self.directory.setText(str(directory))
+        self._on_edited()
+
+    def make_directory(self) -> None:
+        """Make the directory of `keep_in` where it is the one chosen; raises `OSError`."""
+        if self._kept is not None and self.directory.text() == self._kept[0]:
+            self._kept[1]()
+
+    @property
+    def disk(self) -> Path:
+        """What there is of the directory: itself, or what it is to be made in."""
+        folder = self.folder
+        if self._kept is None or str(folder) != self._kept[0]:
+            return folder
+        return next((each for each in (folder, *folder.parents) if each.exists()), folder)
+
+    @property
     def folder(self) -> Path:
         """The directory as it stands in its field."""
         folder = Path(self.directory.text())
@@ -91,7 +116,11 @@ class FileFields(QWidget):
 
     @property
     def _directory_problem(self) -> str:
-        return "" if self._station else directory_problem(self.directory.text())
+        if self._station:
+            return ""
+        text = self.directory.text()
+        kept = self._kept is not None and text == self._kept[0]
+        return directory_problem(str(self.disk) if kept else text)
 
     def path(self, suffix: str, *, exact: bool = False) -> Path:
         """Return the whole path for a file that begins now; `exact` names milliseconds too."""

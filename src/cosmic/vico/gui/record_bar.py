@@ -248,7 +248,7 @@ class RecordBar(QWidget):
             return self.files.problem
         chosen = self.chosen
         try:
-            room_s = self._camera.room_s(self.files.folder, chosen.name if chosen else "")
+            room_s = self._camera.room_s(self.files.disk, chosen.name if chosen else "")
         except CosmicError as exc:
             return str(exc)
         return "" if room_s is None else f"disk lasts {duration_text(room_s)}"
@@ -271,7 +271,11 @@ class RecordBar(QWidget):
             overwrite_question(self, path, lambda: self._try(lambda: act(True))).open()
             self.refresh()
         else:
-            self._try(lambda: act(False))
+            self._try(lambda: self._into_new(act))
+
+    def _into_new(self, act: Callable[[bool], object]) -> None:
+        self.files.make_directory()
+        act(False)
 
     def _on_snap(self) -> None:
         path = self.files.path(STILL, exact=True)
