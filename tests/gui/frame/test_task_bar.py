@@ -57,6 +57,15 @@ def test_how_it_ended_has_the_whole_width_at_the_same_height(qtbot, bar):
     assert bar.sizeHint().height() <= bar.minimumHeight() == before
 
 
+def test_in_a_narrow_column_it_says_how_a_task_ended(qtbot, bar):
+    bar.resize(140, bar.height())
+    task = Task("Saving microscope_2026-11-29_14-10-36-326.png")
+    bar.follow(task)
+    task.finish()
+    qtbot.waitUntil(lambda: bar.text.shown_text == "done")
+    assert bar.text.text() == f"{task.title}: done"
+
+
 def test_of_an_older_task_nothing_is_shown_any_more(bar):
     first, second = Task("First"), Task("Second")
     bar.follow(first)

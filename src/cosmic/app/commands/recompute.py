@@ -103,7 +103,7 @@ def lines_of(found: Comparison, analysis: Analysis) -> list[str]:
     if found.missing:
         numbers = ", ".join(map(str, found.missing))
         lines.append(f"  in the record, and not in the raw files: fibre {numbers}")
-    lines += [f"  otherwise in the record: {each}" for each in found.otherwise]
+    lines += [f"  otherwise in the record: {each}" for each in found.differences]
     lines += [f"another version: {each}" for each in found.versions]
     lines.append(f"scale of the force: {scale_words(analysis.scale)}")
     return lines

@@ -1,6 +1,7 @@
 """What the interval of a bending stiffness follows from, after GUM."""
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -16,7 +17,7 @@ from cosmic.autonomy.bending.inference import (
 from cosmic.autonomy.bending.result import COMMON_SOURCES, Contribution, Floats, Kind
 from cosmic.autonomy.bending.settings import FitSettings
 
-NOT_TOGETHER: Final = "readings that do not lie together"
+EXCESS_SCATTER: Final = "scatter of the spans beyond what was foreseen"
 """By what the interval is wider where readings scatter more than foreseen."""
 
 
@@ -72,7 +73,7 @@ def budget_of(
     clamp = float(of_depth @ (at_depth - mean) ** 2)
     slope = math.sqrt(clamp) / max(posterior.depth_std_um, 1e-9)
     more = (posterior.excess - 1.0) * sum(line[5] for line in lines)
-    lines.append((NOT_TOGETHER, Kind.A, math.sqrt(more), "", 1.0, more))
+    lines.append((EXCESS_SCATTER, Kind.A, math.sqrt(more), "", 1.0, more))
     lines.append(("depth of the clamp", Kind.B, posterior.depth_std_um, "um", slope, clamp))
     variance = sum(line[5] for line in lines) or 1.0
     budget = [
@@ -80,6 +81,21 @@ def budget_of(
         for name, kind, std, unit, slope, part in lines
     ]
     return tuple(sorted(budget, key=lambda line: -line.share))
+
+
+def combined_std_ln(budget: Sequence[Contribution], *, common: bool = False) -> float:
+    """Return the standard uncertainty of ln(EI) by its budget, or that which all fibres share.
+
+    What is learned together goes together, so that its lines alone do not add up: the whole
+    follows from the shares of the others.
+    """
+    alone = [line for line in budget if line.source not in COMMON_SOURCES]
+    share = sum(line.share for line in alone)
+    lines = alone if share > 0.0 else budget
+    variance = sum((line.std * line.sensitivity) ** 2 for line in lines)
+    whole = variance / share if share > 0.0 else variance
+    part = sum(line.share for line in budget if line.common) if common else 1.0
+    return math.sqrt(whole * part)
 
 
 def _typical_std(weights: Floats, covariance: Floats) -> float:

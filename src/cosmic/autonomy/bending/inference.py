@@ -185,8 +185,7 @@ def readings_of(
     span = np.array([each.span for each in rows])
     k = np.array([each.k_un_um for each in rows])
     sign = np.array([each.sign for each in rows])
-    friction = np.array([fits[n].by_friction for n in span]) * sign
-    friction += np.array([fits[n].by_friction_both for n in span])
+    friction = np.array([each.by_friction for each in rows])
     contact = response.by_contact[span]
     glass = certified is not None
     softer, by_shear, shear = _sheared(response.by_square[span], settings, glass=glass)
@@ -312,15 +311,19 @@ class _Row(NamedTuple):
     k_un_um: float
     std_part: float
     sign: float
+    by_friction: float
 
 
 def _rows(fits: Sequence[SpanFit]) -> list[_Row]:
     """Return what was read of each span: on the way out, then on the way back if there is one."""
     rows: list[_Row] = []
     for number, fit in enumerate(fits):
-        rows.append(_Row(number, fit.k_loading_un_um, fit.out_std_part, 1.0))
+        both = fit.by_friction_both
+        out = both + fit.by_friction
+        rows.append(_Row(number, fit.k_loading_un_um, fit.out_std_part, 1.0, out))
         if fit.k_unloading_un_um > 0.0 and math.isfinite(fit.back_std_part):
-            rows.append(_Row(number, fit.k_unloading_un_um, fit.back_std_part, -1.0))
+            back = both - fit.by_friction
+            rows.append(_Row(number, fit.k_unloading_un_um, fit.back_std_part, -1.0, back))
     return rows
 
 

@@ -1,7 +1,6 @@
 """What a bend test says about a fibre, and how far it may be believed."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
@@ -94,21 +93,6 @@ class Contribution:
     def common(self) -> bool:
         """Whether it is the same for all fibres of a campaign: their mean does not lessen it."""
         return self.source in (*COMMON_SOURCES, DRIFT_FORM)
-
-
-def combined_std_ln(budget: Sequence[Contribution], *, common: bool = False) -> float:
-    """Return the standard uncertainty of ln(EI) by its budget, or that which all fibres share.
-
-    What is learned together goes together, so that its lines alone do not add up: the whole
-    follows from the shares of the others.
-    """
-    alone = [line for line in budget if line.source not in COMMON_SOURCES]
-    share = sum(line.share for line in alone)
-    lines = alone if share > 0.0 else budget
-    variance = sum((line.std * line.sensitivity) ** 2 for line in lines)
-    whole = variance / share if share > 0.0 else variance
-    part = sum(line.share for line in budget if line.common) if common else 1.0
-    return math.sqrt(whole * part)
 
 
 @renamed_fields(ways_correlation="branches_correlation")

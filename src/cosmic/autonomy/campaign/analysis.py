@@ -333,9 +333,9 @@ class Comparison:
         By how much the sensor's scale is taken to be another one.
     missing : tuple of int
         Fibres with a value in the record and none in the raw files.
-    otherwise : tuple of str
-        What else the record has otherwise, in words: scale of the force, budgets, spans and the
-        like. Only what the same program made can be compared so closely.
+    differences : tuple of str
+        What else in the record is not what the raw files give, in words: scale of the force,
+        budgets, spans and the like. Only what the same program made can be compared so closely.
     """
 
     compared: int
@@ -343,12 +343,12 @@ class Comparison:
     versions: tuple[str, ...]
     scale_percent: float
     missing: tuple[int, ...] = ()
-    otherwise: tuple[str, ...] = ()
+    differences: tuple[str, ...] = ()
 
     @property
     def same(self) -> bool:
         """Whether the record says what its raw files do."""
-        return not (self.changed or self.missing or self.otherwise)
+        return not (self.changed or self.missing or self.differences)
 
 
 def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
@@ -373,11 +373,11 @@ def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
         if record.bending is not None and number not in analysis.results
     )
     percent = 100.0 * (analysis.scale.off_part - off)
-    otherwise = () if versions else tuple(_otherwise(pairs, changed, scale, analysis.scale))
-    return Comparison(len(pairs), changed, versions, percent, missing, otherwise)
+    differences = () if versions else tuple(_differences(pairs, changed, scale, analysis.scale))
+    return Comparison(len(pairs), changed, versions, percent, missing, differences)
 
 
-def _otherwise(
+def _differences(
     pairs: Sequence[tuple[FibreRecord, BendingResult]],
     changed: Sequence[Change],
     scale: ForceScale | None,

@@ -17,7 +17,8 @@ import numpy.typing as npt
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from cosmic.autonomy.bending.result import BendingResult, combined_std_ln
+from cosmic.autonomy.bending.budget import combined_std_ln
+from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.standards import ForceScale
 from cosmic.autonomy.campaign.analysis import scale_in
 from cosmic.autonomy.campaign.formatting import (

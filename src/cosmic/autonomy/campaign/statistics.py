@@ -9,7 +9,8 @@ from typing import Final
 import numpy as np
 from scipy.special import stdtrit  # scipy.stats takes a second to load
 
-from cosmic.autonomy.bending.result import BendingResult, combined_std_ln
+from cosmic.autonomy.bending.budget import combined_std_ln
+from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.campaign.records import FINISHED, FibreRecord, Outcome
 
 MANY: Final = 10_000

@@ -389,7 +389,7 @@ def update(connection: sqlite3.Connection, table: str, row: Row, *, key: int) ->
 
 FORMAT = "cosmic fibre"
 FORMAT_VERSION = 1
-NOT_WHOLE: Final = (OSError, RuntimeError, KeyError, TypeError, ValueError)
+DAMAGED: Final = (OSError, RuntimeError, KeyError, TypeError, ValueError)
 """What reading a file raises of which a part is not as it was written."""
 
 COLUMNS = {
@@ -476,7 +476,7 @@ def read_curves(path: Path) -> tuple[tuple[Span, ...], tuple[Floats, ...], tuple
                 )
                 for name in sorted(held)
             )
-    except NOT_WHOLE as exc:
+    except DAMAGED as exc:
         raise CampaignError(f"{path} cannot be read: {exc}") from exc
     return spans, fitted, series
 
@@ -542,7 +542,7 @@ def read_fitted(path: Path, fibre: int) -> tuple[Floats, ...]:
         with h5py.File(path, "r") as file:
             group = file.get(f"{fibre:05d}", {})
             return tuple(np.asarray(group[name], dtype=np.float64) for name in sorted(group))
-    except NOT_WHOLE as exc:
+    except DAMAGED as exc:
         raise CampaignError(f"{path} cannot be read: {exc}") from exc
 
 
@@ -588,5 +588,5 @@ def read_raw(path: Path) -> RawFibre:
         raise CampaignError(
             f"{path} was written before raw files held all that an analysis needs: {exc}"
         ) from exc
-    except NOT_WHOLE as exc:
+    except DAMAGED as exc:
         raise CampaignError(f"{path} cannot be read: {exc}") from exc

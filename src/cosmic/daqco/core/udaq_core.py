@@ -190,8 +190,8 @@ class _Silence:
     def look(self) -> None:
         """Raise `DeviceTimeout` where it has lasted too long."""
         self._looks += 1
-        long = self._looks * LOOK_S > self._most_s < WALL.now_s() - self._since_s
-        if not long or not (names := self._boards.silent):
+        silent_s = min(self._looks * LOOK_S, WALL.now_s() - self._since_s)
+        if silent_s <= self._most_s or not (names := self._boards.silent):
             return
         raise DeviceTimeout(
             f"{', '.join(names)}: no samples for {self._most_s:.3g} s, and no error. Acquisition "

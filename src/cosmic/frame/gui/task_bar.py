@@ -62,11 +62,11 @@ class TaskBar(QWidget):
         self._show_running(running=True)
         self.watch.follow(task)
 
-    def say(self, text: str, *, refused: bool = False) -> None:
-        """Show one line without a task."""
+    def say(self, text: str, *shorter: str, refused: bool = False) -> None:
+        """Show one line without a task; of `shorter` the first that fits where it does not."""
         self.show()
         glyph = f"{state_look(State.REFUSED).glyph} " if refused else ""
-        self.text.set_text(glyph + text)
+        self.text.set_text(glyph + text, *(glyph + each for each in shorter))
 
     def _show_running(self, *, running: bool) -> None:
         # Only the height is kept, so that nothing moves: how it ended has the whole width.
@@ -79,10 +79,9 @@ class TaskBar(QWidget):
     def _on_progressed(self, progress: Progress) -> None:
         self._show_running(running=not progress.done)
         if progress.done:
-            if progress.error:
-                self.say(f"{progress.title}: {progress.error}", refused=True)
-            else:
-                self.say(f"{progress.title}: {progress.text or 'done'}")
+            # In a narrow column how it ended is said before what has ended.
+            end = progress.error or progress.text or "done"
+            self.say(f"{progress.title}: {end}", end, refused=bool(progress.error))
             self.ended.emit(progress)
             return
         left = "" if progress.left_s is None else f", {duration_text(progress.left_s)} left"

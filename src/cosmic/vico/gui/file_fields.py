@@ -90,16 +90,20 @@ class FileFields(QWidget):
         self.directory.setText(str(directory))
         self._on_edited()
 
+    @property
+    def _makes_directory(self) -> bool:
+        return self._kept is not None and self.directory.text() == self._kept[0]
+
     def make_directory(self) -> None:
         """Make the directory of `keep_in` where it is the one chosen; raises `OSError`."""
-        if self._kept is not None and self.directory.text() == self._kept[0]:
+        if self._kept is not None and self._makes_directory:
             self._kept[1]()
 
     @property
-    def disk(self) -> Path:
-        """What there is of the directory: itself, or what it is to be made in."""
+    def existing(self) -> Path:
+        """The directory, or what there is of the one that is made when the first file comes."""
         folder = self.folder
-        if self._kept is None or str(folder) != self._kept[0]:
+        if not self._makes_directory:
             return folder
         return next((each for each in (folder, *folder.parents) if each.exists()), folder)
 
@@ -118,9 +122,8 @@ class FileFields(QWidget):
     def _directory_problem(self) -> str:
         if self._station:
             return ""
-        text = self.directory.text()
-        kept = self._kept is not None and text == self._kept[0]
-        return directory_problem(str(self.disk) if kept else text)
+        made = self._makes_directory
+        return directory_problem(str(self.existing) if made else self.directory.text())
 
     def path(self, suffix: str, *, exact: bool = False) -> Path:
         """Return the whole path for a file that begins now; `exact` names milliseconds too."""
@@ -139,7 +142,8 @@ class FileFields(QWidget):
 
     def _on_browse(self) -> None:
         title = "Directory for images"
-        ask_directory(self, title, self.directory.text(), self._on_chosen)
+        start = str(self.existing) if self._makes_directory else self.directory.text()
+        ask_directory(self, title, start, self._on_chosen)
 
     def _on_chosen(self, folder: str) -> None:
         self.directory.setText(folder)

@@ -248,7 +248,7 @@ class RecordBar(QWidget):
             return self.files.problem
         chosen = self.chosen
         try:
-            room_s = self._camera.room_s(self.files.disk, chosen.name if chosen else "")
+            room_s = self._camera.room_s(self.files.existing, chosen.name if chosen else "")
         except CosmicError as exc:
             return str(exc)
         return "" if room_s is None else f"disk lasts {duration_text(room_s)}"

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from cosmic.autonomy.bending.budget import NOT_TOGETHER
+from cosmic.autonomy.bending.budget import EXCESS_SCATTER, combined_std_ln
 from cosmic.autonomy.bending.fit import (
     Certificate,
     MeasuredFibre,
@@ -15,7 +15,7 @@ from cosmic.autonomy.bending.fit import (
     half_width_percent,
     measure_fibre,
 )
-from cosmic.autonomy.bending.result import BendingResult, Kind, Quality, combined_std_ln
+from cosmic.autonomy.bending.result import BendingResult, Kind, Quality
 from cosmic.autonomy.bending.settings import FitSettings
 from oracles.pushed_rod import pushed
 from oracles.sealed_session import STANDARD_EI, Fibre, Session, World, curves
@@ -140,7 +140,7 @@ def test_the_budget_has_what_readings_that_do_not_lie_together_make_of_the_inter
     fibre = dataclasses.replace(Fibre.drawn(session), moves_in=1)
     session.world = dataclasses.replace(WORLD, moved_um=60.0)
     found = fit_bending(spans_of(session, fibre))
-    line = next(each for each in found.budget if each.source == NOT_TOGETHER)
+    line = next(each for each in found.budget if each.source == EXCESS_SCATTER)
     assert line.share > 0.3
     assert combined_std_ln(found.budget) == pytest.approx(std_ln(found), rel=0.1)
 
