@@ -19,8 +19,10 @@ from cosmic.frame.network.station import Station
 
 CHILD = Path(__file__).with_name("network_child.py")
 TESTS = CHILD.parents[1]
-HERE, THERE = "10.231.7.1", "10.231.7.2"
-SPACE, BRIDGE, OUTER, INNER = "cosmic-cut", "cosmic-cut-br", "cosmic-cut-o", "cosmic-cut-i"
+# Its own: another run beside this one, or what a killed one left, must be in nobody's way.
+SPACE = f"cosmic{os.getpid()}"
+BRIDGE, OUTER, INNER = f"{SPACE}b", f"{SPACE}o", f"{SPACE}i"
+HERE, THERE = (f"10.231.{os.getpid() % 256}.{last}" for last in (1, 2))
 
 
 def ip(*words: str) -> bool:
