@@ -361,7 +361,8 @@ def test_connections_leave_no_thread_no_file_and_no_memory(served: Served, count
     for _ in range(count):
         connect_and_go()
     assert wait_until(lambda: not handlers())
-    assert len(running_threads()) <= workers_before, "one of the first five may have ended late"
+    # The last may still be ending, and one of the first five may have been.
+    assert wait_until(lambda: len(running_threads()) <= workers_before), "threads"
     # The engine keeps some threads of its own for a while.
     assert wait_until(lambda: threads() < threads_before + count // 3, 3.0)
     assert wait_until(lambda: files() <= files_before + 4), "open files"
