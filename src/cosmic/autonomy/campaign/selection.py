@@ -21,7 +21,7 @@ CLASSES: Final = 4
 LEAST: Final = 8
 """Fewer fibres of known length are not put into classes."""
 LENGTH_UNKNOWN: Final = frozenset({"crossing", "not certain", "out of the field"})
-"""Problems with which the image shows no length."""
+"""Problems with which the image shows no length; a treated fibre has one all the same."""
 COULD: Final = "none"
 
 
@@ -88,7 +88,7 @@ def selection_of(
     counts = Counter(each.sighting.problem or COULD for each in seen)
     came = Counter(each.sighting.problem or COULD for each in seen if each.outcome is Outcome.GOOD)
     problems = tuple((name, count, came[name]) for name, count in counts.most_common())
-    known = [each for each in seen if each.sighting.problem not in LENGTH_UNKNOWN]
+    known = [each for each in seen if _has_length(each)]
     values = [
         (each.shape.length_um, each.bending.ei_n_m2)
         for each in good
@@ -111,9 +111,14 @@ def selection_of(
     )
 
 
+def _has_length(seen: Seen) -> bool:
+    shown = not math.isnan(seen.treated_um) or seen.sighting.problem not in LENGTH_UNKNOWN
+    return shown and math.isfinite(seen.length_um)
+
+
 def _classes(known: Sequence[Seen], lengths_um: Sequence[float]) -> tuple[LengthClass, ...]:
     """Return classes with about as many of the fibres seen in each, and their weights."""
-    seen_um = np.array([each.sighting.length_um for each in known])
+    seen_um = np.array([each.length_um for each in known])
     edges = np.quantile(seen_um, np.linspace(0.0, 1.0, CLASSES + 1))
     seen_in = np.clip(np.searchsorted(edges, seen_um, side="right") - 1, 0, CLASSES - 1)
     good_in = np.clip(np.searchsorted(edges, lengths_um, side="right") - 1, 0, CLASSES - 1)

@@ -87,6 +87,47 @@ def test_two_treatments_of_one_sighting_count_once(store: CampaignStore) -> None
     assert one.outcome is Outcome.GOOD
 
 
+def test_a_fibre_that_moved_before_its_second_treatment_is_one_fibre(store: CampaignStore) -> None:
+    store.keep_sightings(1, [sighting(0.0), sighting(1000.0, length_um=900.0)])
+    fell = replace(failed(0), shape=Shape(length_um=1500.0), began_s=100.0)
+    put(store, fell, 10.0)
+    put(store, replace(good(0), shape=Shape(length_um=1503.0), began_s=130.0), 400.0)
+    put(store, replace(good(0), shape=Shape(length_um=901.0), began_s=160.0), 1010.0)
+    rates = rates_of(store.reader)
+    assert (rates.seen, rates.graspable, rates.tried, rates.good) == (2, 2, 3, 2)
+
+
+def test_a_fibre_that_a_later_survey_found_was_seen_and_could_be_grasped(
+    store: CampaignStore,
+) -> None:
+    store.keep_sightings(1, [sighting(0.0), sighting(500.0, "crossing")])
+    put(store, replace(good(0), began_s=100.0), 0.0)
+    put(store, replace(good(0), began_s=130.0), 3000.0)
+    put(store, replace(good(0), began_s=900.0), 0.0, plate=2)  # its sightings were not kept
+    rates = rates_of(store.reader)
+    assert (rates.seen, rates.graspable, rates.good) == (3, 2, 3)
+
+
+def test_no_class_of_length_has_more_good_fibres_than_could_be_grasped() -> None:
+    seen = [sighting(1000.0 * n, length_um=1000.0 + 100.0 * n) for n in range(10)]
+    seen[4] = replace(seen[4], problem="not certain", length_um=2500.0)
+    seen[7] = replace(seen[7], problem="out of reach")
+    records = [
+        replace(
+            good(n), found=Pose(1000.0 * n, 0.0, 0.0), shape=Shape(length_um=1003.0 + 100.0 * n)
+        )
+        for n in range(10)
+    ]
+    found = selection_of(seen_fibres(seen, records), records)
+    assert [(each.seen, each.graspable, each.good) for each in found.classes] == [
+        (3, 3, 3),
+        (2, 2, 2),
+        (2, 2, 2),
+        (3, 3, 3),
+    ]
+    assert found.unknown == 0
+
+
 def test_weights_put_right_what_a_choice_by_length_does_to_the_mean() -> None:
     rng = np.random.default_rng(1)
     lengths = rng.uniform(800.0, 2400.0, 400)
