@@ -83,6 +83,11 @@ def notes_of(reader: CampaignReader) -> list[str]:
     ]
     if is_written(reader.folder):
         notes.append("the campaign is running: these are its values of now")
+    elif not reader.analysis():
+        notes.append(
+            "the campaign did not come to its end: what its record says of each fibre was fitted "
+            "with the fibres before it alone; --apply keeps these values"
+        )
     return notes
 
 

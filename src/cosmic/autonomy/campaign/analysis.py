@@ -354,12 +354,7 @@ class Comparison:
 def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
     """Return what an analysis changes of what stands in the record."""
     kept = reader.analysis()
-    before = kept.get("versions", {})
-    versions = tuple(
-        f"{name} {before.get(name, 'unknown')} then, {now} now"
-        for name, now in analysis.versions.items()
-        if before.get(name) != now
-    )
+    versions = _versions(kept, analysis) if kept else ()
     scale = scale_in(kept)
     off = 0.0 if scale is None else scale.off_part
     records = {each.number: each for each in (*reader.finished(), *reader.fibres(STANDARD))}
@@ -373,8 +368,19 @@ def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
         if record.bending is not None and number not in analysis.results
     )
     percent = 100.0 * (analysis.scale.off_part - off)
-    differences = () if versions else tuple(_differences(pairs, changed, scale, analysis.scale))
+    differences: tuple[str, ...] = ()
+    if kept and not versions:
+        differences = tuple(_differences(pairs, changed, scale, analysis.scale))
     return Comparison(len(pairs), changed, versions, percent, missing, differences)
+
+
+def _versions(kept: Mapping[str, Any], analysis: Analysis) -> tuple[str, ...]:
+    before = kept.get("versions", {})
+    return tuple(
+        f"{name} {before.get(name, 'unknown')} then, {now} now"
+        for name, now in analysis.versions.items()
+        if before.get(name) != now
+    )
 
 
 def _differences(

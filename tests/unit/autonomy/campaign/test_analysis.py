@@ -223,6 +223,24 @@ def test_of_a_running_campaign_it_says_that_it_is_running(
     assert "is running" not in capsys.readouterr().out
 
 
+def test_of_a_campaign_that_did_not_come_to_its_end_it_says_so(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute("UPDATE campaign SET analysis_json = '{}'")
+    base.close()
+    main(["recompute", str(folder)])
+    said = capsys.readouterr().out
+    assert "the campaign did not come to its end" in said
+    assert "another version" not in said
+    assert "otherwise in the record" not in said
+    main(["recompute", "--apply", str(folder)])
+    capsys.readouterr()
+    assert main(["recompute", str(folder)]) == 0
+    assert "did not come to its end" not in capsys.readouterr().out
+
+
 def test_a_value_that_no_raw_file_stands_for_is_named(
     campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
