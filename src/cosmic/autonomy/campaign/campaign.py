@@ -456,6 +456,7 @@ class Campaign:
             if arm.fibre is not None:
                 self._record_held(arm, failure)
         self.work.shared.surveyed = False
+        self._standards.not_measured(due)
         logger.warning("the standard was not measured at the %s: %s", due, failure)
         self.store.note(
             "standard",
@@ -527,6 +528,9 @@ class Campaign:
         self._recorder.worked_off = plates.number
         if self._rule.reason(self.progress):
             return ""  # seen where the campaign goes on, after the standard that may be due
+        # What lay too near it is gone by now.
+        if (due := self._standards.due_once_more) and (ended := self._measure_standard(due)):
+            return ended
         if reason := plates.why_no_other(self.fibres):
             return f"{reason}; {text}"
         return self._put_plate(plates)

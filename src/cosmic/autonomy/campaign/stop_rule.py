@@ -112,6 +112,9 @@ BEGIN, MIDDLE, END, PLATE = "begin", "middle", "end", "plate"
 class StandardSchedule:
     """When the standard is due; each start of the program begins anew.
 
+    One that could not be measured, as fibres lie too near, is due once more when the plate is
+    worked off.
+
     Parameters
     ----------
     at : sequence of str
@@ -121,9 +124,12 @@ class StandardSchedule:
     def __init__(self, at: Sequence[str]) -> None:
         self._left = [each for each in at if each != PLATE]
         self._each_plate = PLATE in at
+        self._missed = ""
+        self._once_more = False
 
     def new_plate(self) -> None:
         """Note that another plate is there."""
+        self._missed = ""
         if self._each_plate and PLATE not in self._left:
             self._left.append(PLATE)
 
@@ -132,11 +138,24 @@ class StandardSchedule:
         if BEGIN in self._left:
             return BEGIN
         if ending:
-            return END if END in self._left else ""
+            return END if END in self._left else self._missed
         if PLATE in self._left:
             return PLATE
         return MIDDLE if MIDDLE in self._left and share >= 0.5 else ""
 
+    @property
+    def due_once_more(self) -> str:
+        """What could not be measured on this plate; empty: nothing."""
+        return self._missed
+
     def done(self, due: str) -> None:
-        """Note that it was measured, or tried."""
-        self._left.remove(due)
+        """Note that it is measured, or tried."""
+        self._once_more = due == self._missed
+        self._missed = ""
+        if due in self._left:
+            self._left.remove(due)
+
+    def not_measured(self, due: str) -> None:
+        """Note that what was tried last could not be measured."""
+        if not self._once_more and due != END:
+            self._missed = due

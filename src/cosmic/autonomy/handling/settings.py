@@ -264,7 +264,8 @@ class StandardSettings(StrictModel):
     x_um, y_um, within_um : float
         Where its middle lies on a plate that is put on, and how far from there it is looked for.
     at : tuple of str
-        When it is measured; "plate" is on each further plate, before its fibres.
+        When it is measured; "plate" is on each further plate, before its fibres. What cannot be
+        measured then is tried once more when the plate is worked off.
     """
 
     ei_n_m2: float = Field(0.0, ge=0.0)

@@ -129,3 +129,35 @@ def test_the_standard_is_due_on_each_further_plate_where_that_is_wanted() -> Non
     without = StandardSchedule(("end",))
     without.new_plate()
     assert without.due(0.1, ending=False) == ""
+
+
+def test_a_standard_that_could_not_be_measured_is_due_once_more_on_its_plate() -> None:
+    due = StandardSchedule(("begin", "plate", "end"))
+    due.done("begin")
+    due.not_measured("begin")
+    assert due.due(0.1, ending=False) == "", "not before the plate is worked off"
+    assert due.due_once_more == "begin"
+    due.done("begin")
+    due.not_measured("begin")
+    assert due.due_once_more == "", "once, and no more"
+    due.new_plate()
+    due.done(PLATE)
+    due.not_measured(PLATE)
+    due.new_plate()
+    assert due.due_once_more == "", "that plate is gone"
+    due.done(PLATE)
+    assert due.due_once_more == ""
+    assert due.due(1.0, ending=True) == "end"
+    due.done("end")
+    due.not_measured("end")
+    assert due.due(1.0, ending=True) == "", "it would be tried for ever"
+
+
+def test_a_campaign_that_ends_measures_what_it_missed_where_the_end_is_not_asked_for() -> None:
+    due = StandardSchedule(("begin",))
+    due.done("begin")
+    due.not_measured("begin")
+    assert due.due(1.0, ending=True) == "begin"
+    due.done("begin")
+    due.not_measured("begin")
+    assert due.due(1.0, ending=True) == ""
