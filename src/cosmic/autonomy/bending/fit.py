@@ -14,6 +14,7 @@ from cosmic.autonomy.bending.inference import (
     FRICTION,
     Readings,
     common_prior,
+    off_model,
     readings_of,
 )
 from cosmic.autonomy.bending.population import Assessed, Population, assess
@@ -363,7 +364,7 @@ def _concluded(
         ei_high_n_m2=math.exp(posterior.log_high) * scale,
         clamp_offset_um=posterior.depth_um,
         clamp_offset_std_um=posterior.depth_std_um,
-        spans=fibre.spans,
+        spans=_with_off_model(fibre, readings, assessed, settings),
         used=fibre.used,
         chi2=chi2,
         freedom=assessed.evidence.freedom,
@@ -374,6 +375,19 @@ def _concluded(
         scale_verified=verified,
     )
     return checked(result, readings, assessed, settings)
+
+
+def _with_off_model(
+    fibre: MeasuredFibre, readings: Readings, assessed: Assessed, settings: FitSettings
+) -> tuple[SpanFit, ...]:
+    left = off_model(
+        readings, assessed.common, settings, assessed.evidence, assessed.posterior.weights
+    )
+    of_span = dict(zip(fibre.used, left.tolist(), strict=True))
+    return tuple(
+        replace(each, off_model_log=of_span.get(number, math.nan))
+        for number, each in enumerate(fibre.spans)
+    )
 
 
 def in_time(measured: Sequence[MeasuredFibre], times_s: Sequence[float]) -> list[MeasuredFibre]:

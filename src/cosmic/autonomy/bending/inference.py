@@ -33,6 +33,9 @@ EXACT: Final = 1e-15
 
 MOST_TRIES: Final = 1000
 
+WEIGHED: Final = 1e-4
+"""Depths and variations that weigh less than this do not count for what a fit leaves."""
+
 UNLIKELY: Final = 1e-3
 TWISTED: Final = 0.25
 """Of what friction does to a section askew: the part that differs between spans, by twist."""
@@ -533,3 +536,24 @@ def _quantile(weights: Floats, means: Floats, stds: Floats, part: float) -> floa
     if not low < high or not (np.isfinite(weights).all() and np.isfinite(stds).all()):
         return 0.5 * (low + high)
     return float(brentq(more, low, high, xtol=EXACT, rtol=EXACT, maxiter=MOST_TRIES))
+
+
+def off_model(
+    readings: Readings, common: Common, settings: FitSettings, evidence: Evidence, weights: Floats
+) -> Floats:
+    """Return what a fit leaves of ln(k) of each span, in the order of the spans.
+
+    Of what the readings are off, noise, places of contact and variation along the fibre make the
+    part that goes with their covariances; the rest is taken for what else is not known.
+    """
+    span, laid = readings.span, laid_out(readings, settings)
+    known = readings.to_common @ common.mean + own_mean(readings)
+    away = readings.log_k - laid.log_stiffness[:, span] - known
+    varied = varied_covariance(readings, settings)
+    fixed, scatter = fixed_covariance(readings, common), readings.noise + readings.repeat
+    depth, variation = np.nonzero(weights > WEIGHED)
+    along = varied[depth] * VARIATIONS[variation, None, None] ** 2
+    off = away[depth] - evidence.log_ei[depth, variation][:, None]
+    each = (scatter + along) @ np.linalg.solve(fixed + along, off[:, :, None])
+    left = np.average(each[:, :, 0], axis=0, weights=weights[depth, variation])
+    return np.array([left[span == number].mean() for number in np.unique(span)])

@@ -137,6 +137,10 @@ class SpanFit:
     freed_log, freed_std_part : float
         ln of the force, as a part of itself, once friction was made to let go of a section askew,
         and its standard deviation; nan where that was not tried.
+    off_model_log : float
+        ln of its stiffness, less that of the result's model: what noise, places of contact and a
+        stiffness that varies along the fibre leave once scale, friction, compliance and the like
+        are taken off; nan where the result does not stand on it.
     """
 
     place_um: float
@@ -167,6 +171,7 @@ class SpanFit:
     relaxation_std_part: float = math.nan
     freed_log: float = math.nan
     freed_std_part: float = math.nan
+    off_model_log: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)

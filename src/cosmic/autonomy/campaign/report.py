@@ -473,6 +473,7 @@ def _span_rows(result: BendingResult) -> list[tuple[str, ...]]:
             f"{number(fit.k_un_um, 3)} ± {number(1.96 * fit.k_std_un_um, 3)}",
             number(fit.k_loading_un_um, 3),
             number(fit.k_unloading_un_um, 3),
+            number(100.0 * math.expm1(fit.off_model_log), 1),
             number(fit.hysteresis_percent, 1),
             number(fit.drift_un_s, 3),
             number(fit.peak_un, 1),

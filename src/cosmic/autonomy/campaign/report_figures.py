@@ -146,7 +146,10 @@ def residual_figure(record: FibreRecord) -> str:
 
 
 def stiffness_figure(record: FibreRecord) -> str:
-    """Return k^(-1/3) over the position, with the line whose slope is the bending stiffness."""
+    """Return k^(-1/3) over the position, with the line whose slope is the bending stiffness.
+
+    Circles as it was read, discs what the fit makes of it.
+    """
     result = record.bending
     if result is None:
         return ""
@@ -161,8 +164,11 @@ def stiffness_figure(record: FibreRecord) -> str:
     y = Axis("k^(-1/3), (µN/µm)^(-1/3)", 0.0, 1.1 * max(*roots, slope * (end - begin)))
     plot = Plot(x, y, f"Stiffness of the spans of fibre {record.number}")
     plot.line([begin, end], [0.0, slope * (end - begin)], GREY)
-    for index, (position, root) in enumerate(zip(positions, roots, strict=True)):
-        plot.points([position], [root], BLUE, hollow=index not in result.used)
+    plot.points(positions, roots, GREY, hollow=True)
+    for each in fits:
+        if math.isfinite(each.off_model_log):
+            root = slope * (each.place_um - begin) * math.exp(-each.off_model_log / 3.0)
+            plot.points([each.place_um], [root], BLUE)
     plot.note(begin + 0.16 * (end - begin), 0.06 * y.high, "clamp, where the line begins")
     return plot.svg()
 

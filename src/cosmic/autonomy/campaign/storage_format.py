@@ -78,7 +78,7 @@ CREATE TABLE span (
     place_um REAL, k_un_um REAL, k_std_un_um REAL, k_loading_un_um REAL, k_unloading_un_um REAL,
     hinge_um REAL, hinge_back_um REAL, baseline_un REAL, drift_un_s REAL,
     hysteresis_percent REAL, peak_un REAL, chi2 REAL, freedom INTEGER,
-    flags TEXT NOT NULL DEFAULT '', PRIMARY KEY (fibre, number)
+    flags TEXT NOT NULL DEFAULT '', off_model_log REAL, PRIMARY KEY (fibre, number)
 );
 CREATE TABLE picture (
     fibre INTEGER NOT NULL REFERENCES fibre, number INTEGER NOT NULL, name TEXT NOT NULL,
@@ -131,6 +131,7 @@ ADDED: Final = {
         "plate": "INTEGER NOT NULL DEFAULT 1",
         "probability": "REAL",
     },
+    "span": {"off_model_log": "REAL"},
 }
 """Columns that a campaign begun with an earlier program does not have."""
 
@@ -164,6 +165,7 @@ SPAN_NUMBERS: Final = (
     "hysteresis_percent",
     "peak_un",
     "chi2",
+    "off_model_log",
 )
 SHAPE_NUMBERS: Final = (
     "length_um",
@@ -338,7 +340,7 @@ def _contribution(line: Mapping[str, Any]) -> Contribution:
 
 
 def _span_fit(row: Row, fitted_un: Floats) -> SpanFit:
-    numbers = {name: number(row[name]) for name in SPAN_NUMBERS}
+    numbers = {name: number(row.get(name)) for name in SPAN_NUMBERS}
     return SpanFit(
         **numbers,
         freedom=int(row["freedom"] or 0),

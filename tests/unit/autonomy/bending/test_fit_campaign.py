@@ -75,6 +75,33 @@ def test_a_standard_gives_the_scale_that_the_certificate_of_the_sensor_does_not(
         assert half_width_percent(verified) < half_width_percent(alone)
 
 
+def test_spans_are_told_less_what_the_fit_knows_beside_their_stiffness() -> None:
+    session = Session(dataclasses.replace(WORLD, gain=0.0), np.random.default_rng(5))
+    session.gain = 1.06
+    fibres = [Fibre.drawn(session) for _ in range(3)]
+    kept = [measured(session, each, SETTINGS) for each in fibres]
+    standard = measured(session, Fibre.standard(session), SETTINGS, CERTIFICATE)
+    for found in fit_campaign(kept, standards=[standard], settings=SETTINGS):
+        ei_un_um2, begin = found.ei_n_m2 / SCALE, found.clamp_offset_um
+        used = [found.spans[n] for n in found.used]
+        left = [each.off_model_log for each in used]
+        read = [
+            math.log(each.k_un_um * (each.place_um + begin) ** 3 / (3.0 * ei_un_um2))
+            for each in used
+        ]
+        assert max(map(abs, left)) < 0.04
+        assert np.mean(read) > np.mean(left) + 0.03  # they are read 6 % too stiff
+
+
+def test_a_span_that_lies_off_the_line_is_told() -> None:
+    spans = sorted(pushed_on_rig(rig(contact_std_um=0.1)), key=lambda each: each.nominal_um)
+    odd = dataclasses.replace(spans[2], force_un=1.12 * spans[2].force_un)
+    plain, found = fit_bending(spans), fit_bending([*spans[:2], odd, *spans[3:]])
+    assert found.spans[2].off_model_log > plain.spans[2].off_model_log + 0.05
+    short = fit_bending(spans[:1])
+    assert math.isfinite(short.spans[0].off_model_log)
+
+
 def test_what_others_say_of_clamp_and_friction_makes_an_interval_narrower() -> None:
     settings, session = FitSettings(), Session(WORLD, np.random.default_rng(8))
     fibres = [Fibre.drawn(session) for _ in range(7)]

@@ -21,7 +21,7 @@ from cosmic.autonomy.campaign.records import (
     Shape,
 )
 from cosmic.autonomy.campaign.report import write_report
-from cosmic.autonomy.campaign.report_figures import force_figure
+from cosmic.autonomy.campaign.report_figures import force_figure, stiffness_figure
 from cosmic.autonomy.campaign.report_table import COLUMNS, read_campaign, write_table
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
@@ -292,3 +292,18 @@ def test_spans_that_are_not_those_of_the_result_cost_no_report(tmp_path: Path) -
         store.finish_fibre(replace(record, spans=(cut,)))
         write_report(store, tmp_path / "run" / "report.html")
     assert "Fibre 1" in (tmp_path / "run" / "report.html").read_text("utf-8")
+
+
+def test_the_spans_are_drawn_as_they_were_read_and_as_the_fit_has_them() -> None:
+    def circles(svg: str) -> list[bool]:
+        """Return of each circle whether it is filled."""
+        found = ET.fromstring(svg).iter("{http://www.w3.org/2000/svg}circle")
+        return [each.get("fill") != "none" for each in found]
+
+    record = good(1)
+    assert record.bending is not None
+    spans, used = record.bending.spans, len(record.bending.used)
+    assert sorted(circles(stiffness_figure(record))) == [False] * len(spans) + [True] * used
+    older = tuple(replace(each, off_model_log=math.nan) for each in spans)
+    kept = replace(record, bending=replace(record.bending, spans=older))
+    assert circles(stiffness_figure(kept)) == [False] * len(spans)
