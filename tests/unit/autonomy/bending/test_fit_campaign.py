@@ -75,7 +75,7 @@ def test_a_standard_gives_the_scale_that_the_certificate_of_the_sensor_does_not(
         assert half_width_percent(verified) < half_width_percent(alone)
 
 
-def test_spans_are_told_less_what_the_fit_knows_beside_their_stiffness() -> None:
+def test_what_the_fit_knows_beside_the_stiffness_is_taken_off_each_span() -> None:
     session = Session(dataclasses.replace(WORLD, gain=0.0), np.random.default_rng(5))
     session.gain = 1.06
     fibres = [Fibre.drawn(session) for _ in range(3)]
@@ -93,7 +93,7 @@ def test_spans_are_told_less_what_the_fit_knows_beside_their_stiffness() -> None
         assert np.mean(read) > np.mean(left) + 0.03  # they are read 6 % too stiff
 
 
-def test_a_span_that_lies_off_the_line_is_told() -> None:
+def test_a_span_off_the_model_is_named_by_how_much() -> None:
     spans = sorted(pushed_on_rig(rig(contact_std_um=0.1)), key=lambda each: each.nominal_um)
     odd = dataclasses.replace(spans[2], force_un=1.12 * spans[2].force_un)
     plain, found = fit_bending(spans), fit_bending([*spans[:2], odd, *spans[3:]])
