@@ -22,6 +22,7 @@ from benchmarks.figures import Figure, table
 from benchmarks.full_platform import FullStand, full_platform
 from benchmarks.soak import command, helpers_kb, resident_kb, thread_count
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.garbage import objects_of
 
 NAME = "full_soak"
 PARTS = 40
@@ -111,7 +112,7 @@ def collect(bench: FullStand, seconds: float, publish: Callable[[Look], None]) -
                         (time.perf_counter() - began_s) / 60.0,
                         resident_kb() / 1024,
                         max(helpers_kb(), default=0.0) / 1024,
-                        len(gc.get_objects()) + gc.get_freeze_count(),
+                        objects_of() + gc.get_freeze_count(),
                         thread_count(),
                         len(list(FILES.iterdir())) if FILES.exists() else 0,
                         log_kb(folder),

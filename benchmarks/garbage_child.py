@@ -13,6 +13,7 @@ from PySide6.QtCore import QTimer
 from cosmic.app.cli import main
 from cosmic.app.windows import run_window
 from cosmic.app.windows.operator_window import OperatorWindow
+from cosmic.frame.garbage import objects_of
 
 SECONDS = float(sys.argv[1])
 TICK_S = 0.001
@@ -86,7 +87,7 @@ def _work(window: OperatorWindow) -> None:
             longest_ms={n: 1e3 * max(all_s, default=0.0) for n, all_s in pauses.took_s.items()},
             counts={n: len(all_s) for n, all_s in pauses.took_s.items()},
             total_ms=1e3 * sum(sum(all_s) for all_s in pauses.took_s.values()),
-            objects=len(gc.get_objects()) + gc.get_freeze_count(),
+            objects=objects_of() + gc.get_freeze_count(),
             running=not campaign.over,
         )
         campaign.abort("the benchmark is over")

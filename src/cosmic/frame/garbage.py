@@ -171,7 +171,7 @@ class Garbage:
             if self._grown >= MOST_FROZEN or (many and long_rest):
                 return self._collect(at_rest=long_rest, whole=True)
             passes = gc.get_count()[2]  # of young objects, since old ones were looked through
-            grown = len(gc.get_objects(generation=2)) if passes else 0
+            grown = objects_of(2) if passes else 0
             long_ago = now_s - self._collected_s >= LONGEST_S
             at_rest = rest_s >= REST_S
             if grown >= (WORTHWHILE if at_rest else MOST) or (grown and long_ago):
@@ -222,6 +222,16 @@ class Garbage:
 
 
 GARBAGE: Final = Garbage()
+
+
+def objects_of(generation: int | None = None) -> int:
+    """Return how many objects of a generation the collector knows, of all if None; any thread.
+
+    The list of them must not be seen by another thread: it holds a tuple that one of them just
+    builds from an iterator, and Python cannot make such a tuple longer then (a SystemError). So
+    listed, counted and dropped is in one step of the interpreter, which `map` does.
+    """
+    return next(map(len, map(gc.get_objects, (generation,))))
 
 
 def freeze_what_is_loaded() -> None:

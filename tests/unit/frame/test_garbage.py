@@ -3,12 +3,19 @@
 import gc
 import weakref
 from collections.abc import Callable, Iterator
-from threading import Thread
+from threading import Event, Thread
 
 import pytest
 
 from cosmic.frame import garbage
-from cosmic.frame.garbage import LONG_REST_S, LONGEST_S, MOST, WORTHWHILE, Garbage
+from cosmic.frame.garbage import (
+    LONG_REST_S,
+    LONGEST_S,
+    MOST,
+    WORTHWHILE,
+    Garbage,
+    objects_of,
+)
 
 
 class Ring:
@@ -272,3 +279,32 @@ def test_freed_memory_goes_back_to_the_system_at_a_rest_and_not_while_something_
         assert bench.after(LONGEST_S) is not None
         bench.moves = False
     assert given == [False]
+
+
+def test_objects_are_counted_while_another_thread_builds_a_tuple() -> None:
+    """A list of all objects would hold the unfinished tuple, which then cannot grow."""
+    ended, failed = Event(), list[BaseException]()
+
+    def values() -> Iterator[int]:
+        for number in range(60):
+            if number == 1:
+                gc.collect(1)  # the tuple is old from here on
+            yield number
+
+    def build() -> None:
+        while not ended.is_set():
+            try:
+                tuple(values())
+            except SystemError as exc:
+                failed.append(exc)
+                return
+
+    thread = Thread(target=build)
+    thread.start()
+    try:
+        counts = [objects_of(2) for _ in range(300)]
+    finally:
+        ended.set()
+        thread.join()
+    assert not failed
+    assert min(counts) > 0
