@@ -255,6 +255,27 @@ def test_an_operation_that_the_operator_ends_is_no_error(make: Make, qtbot: QtBo
     assert card.line.text() == "It was ended by the operator."
 
 
+def test_what_is_asked_for_while_an_operation_runs_is_refused_and_leaves_its_card(
+    make: Make, qtbot: QtBot, tmp_path: Path
+) -> None:
+    window = with_fibres(make, qtbot)
+    found = operations(window)
+    card = take(window, qtbot)
+    view = tasks(window).central_view.camera
+    found.replay(RecordedProcedure(name="again", step=[]), lambda: tmp_path)
+    assert view.message.text == "Replay again: take with left is running; end it first"
+    found.close_gently("right")
+    assert "is running" in view.message.text
+    assert (card.badge.state, card.title.text()) == (State.BUSY, "Take with left")
+    assert card.stop.isVisible()
+    assert found.title == "Take with left"
+    qtbot.mouseClick(card.stop, LEFT)
+    qtbot.waitUntil(lambda: not found.running, timeout=60_000)
+    qtbot.waitUntil(card.close_button.isVisible)
+    assert view.message.text == ""
+    assert found.title == ""
+
+
 def test_after_an_operation_that_failed_the_coach_zooms_out(make: Make, qtbot: QtBot) -> None:
     window = with_fibres(make, qtbot)
     card = take(window, qtbot)

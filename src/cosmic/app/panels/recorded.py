@@ -120,6 +120,7 @@ class RecorderPanel(QWidget):
         self._make, self._frames, self._folder = make, frames, folder
         self._recorder: ProcedureRecorder | None = None
         self._steps: list[RecordedStep] = []
+        self._running = ""
         self._look = QTimer(self, interval=LOOK_MS)
         self._look.timeout.connect(self.look)
         self._make_widgets()
@@ -127,6 +128,7 @@ class RecorderPanel(QWidget):
         self._show_buttons()
 
     def _make_widgets(self) -> None:
+        self.line = named(ElidedLabel(), "recorderLine")
         self.record = named(push_button("● Record steps", ""), "recordSteps")
         self.record.setCheckable(True)
         self.record.toggled.connect(self._on_record)
@@ -153,10 +155,9 @@ class RecorderPanel(QWidget):
         self.open = self._button("Open…", "Open a procedure that was saved", self._on_open)
         self.replay = named(push_button("Replay", ""), "replaySteps")
         self.replay.clicked.connect(self.request_replay)
-        self.go_on = named(push_button("Continue", "Go on with the replay"), "continueReplay")
+        self.go_on = named(push_button("Continue", ""), "continueReplay")
         self.go_on.clicked.connect(self.continued)
-        self.go_on.hide()
-        self.line = named(ElidedLabel(), "recorderLine")
+        self.show_waiting("")
 
     @staticmethod
     def _button(text: str, tip: str, act: Callable[[], None]) -> QPushButton:
@@ -174,7 +175,8 @@ class RecorderPanel(QWidget):
         grid.setSpacing(STEP_PX // 2)
         grid.addWidget(self.save, 0, 0)
         grid.addWidget(self.open, 0, 1)
-        grid.addWidget(self.replay, 1, 0, 1, 2)
+        grid.addWidget(self.replay, 1, 0)
+        grid.addWidget(self.go_on, 1, 1)
         boxes: tuple[QWidget, ...] = (self.frame, self.name)
         for box in boxes:
             box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
@@ -184,7 +186,7 @@ class RecorderPanel(QWidget):
         column.addWidget(self.record)
         column.addWidget(self.frame)
         column.addWidget(self.list, 1)
-        below: tuple[QWidget, ...] = (edits, self.name, files, self.go_on, self.line)
+        below: tuple[QWidget, ...] = (edits, self.name, files, self.line)
         for widget in below:
             column.addWidget(widget)
 
@@ -217,9 +219,10 @@ class RecorderPanel(QWidget):
         self.ask.setEnabled(chosen and bool(_numbers(self._steps[row])))
         self.save.setEnabled(bool(count))
         recording = self.record.isChecked()
-        self.replay.setEnabled(bool(count) and not recording)
-        tip = "End the recording of steps first" if recording else "Carry the steps out, in order"
-        self.replay.setToolTip(tip if count else "There are no steps yet")
+        why_not = "" if count else "There are no steps yet"
+        why_not = why_not or ("End the recording of steps first" if recording else self._running)
+        self.replay.setEnabled(not why_not)
+        self.replay.setToolTip(why_not or "Carry the steps out, in order")
         self.record.setToolTip(
             "End the recording of steps" if recording else "Note what is moved, lit and measured"
         )
@@ -370,10 +373,16 @@ class RecorderPanel(QWidget):
         except CosmicError as exc:
             self.say(f"{state_look(State.REFUSED).glyph} {exc}")
 
+    def show_running(self, title: str) -> None:
+        """Offer no replay while an operation runs, by its title; empty: none does."""
+        self._running = f"{title} is running; end it first" if title else ""
+        self._show_buttons()
+
     def show_waiting(self, words: str) -> None:
         """Offer to go on with a replay that waits; empty: it waits no longer."""
-        waited = self.go_on.isVisibleTo(self)
-        self.go_on.setVisible(bool(words))
+        waited = self.go_on.isEnabled()
+        self.go_on.setEnabled(bool(words))
+        self.go_on.setToolTip("Go on with the replay" if words else "No replay waits for you")
         if words or waited:
             self.say(words)
 

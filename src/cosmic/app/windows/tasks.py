@@ -245,6 +245,9 @@ class TaskLayout(QObject):
         panel.replay_requested.connect(lambda found: operations.replay(found, self.folder))
         panel.continued.connect(operations.go_on)
         operations.waiting.connect(panel.show_waiting)
+        panel.show_running(operations.title)
+        operations.began.connect(panel.show_running)
+        operations.ended.connect(lambda: panel.show_running(operations.title))
         operations.replay_wanted.connect(panel.request_replay)
         operations.offered = lambda: panel.procedure if panel.list.count() else None
         if self.force is not None:
