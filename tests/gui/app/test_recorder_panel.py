@@ -9,6 +9,7 @@ from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.recorded import RecorderPanel, ValuesDialog
 from cosmic.autonomy.recorded.steps import (
+    LensStep,
     LightStep,
     MoveStep,
     OperationStep,
@@ -144,3 +145,24 @@ def test_no_replay_is_offered_while_an_operation_runs(panel: RecorderPanel) -> N
     assert panel.replay.toolTip() == "Take with left is running; end it first"
     panel.show_running("")
     assert panel.replay.isEnabled()
+
+
+def test_the_numbers_of_a_step_are_changed_in_the_list(panel: RecorderPanel, qtbot: QtBot) -> None:
+    panel.show_steps([LightStep(percent=40.0), LensStep(zoom=2.0, focus_counts=4000)])
+    panel.list.setFocus()
+    panel.list.itemActivated.emit(panel.list.item(1))  # by a double click, or Enter
+    dialog = panel.findChild(ValuesDialog)
+    assert dialog is not None
+    zoom, focus = dialog.fields
+    zoom.setText("1")
+    focus.setText("3900")
+    qtbot.mouseClick(dialog.buttons.button(QDialogButtonBox.StandardButton.Ok), LEFT)
+    assert texts(panel) == ["1  Light 40 %", "2  Lens: zoom 1x, focus 3900 counts"]
+    assert panel.list.currentRow() == 1
+
+
+def test_what_an_operation_does_not_heed_is_not_asked_for(panel: RecorderPanel) -> None:
+    panel.show_steps([OperationStep(operation=SingleOperation.TAKE, gripper="left")])
+    assert not panel.ask.isEnabled()
+    panel.edit()
+    assert panel.findChild(ValuesDialog) is None

@@ -42,19 +42,24 @@ _USUAL_PAUSE_S: Final = 1.0
 
 
 class ValuesDialog(QDialog):
-    """Asks for the values that a replay is to have.
+    """Asks for the values that a replay, or a step, is to have.
 
     Parameters
     ----------
+    title : str
+        What they are for.
     asked : dict
         By step and key: the words, and the value recorded.
     """
 
     def __init__(
-        self, asked: dict[tuple[int, str], tuple[str, float]], parent: QWidget | None = None
+        self,
+        title: str,
+        asked: dict[tuple[int, str], tuple[str, float]],
+        parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Replay")
+        self.setWindowTitle(title)
         self._fields: dict[tuple[int, str], ValueField] = {}
         form = QFormLayout()
         for key, (words, value) in asked.items():
@@ -97,6 +102,8 @@ class RecorderPanel(QWidget):
         Returns what points can be relative to.
     folder : callable
         Returns where files are kept.
+    config : Path or None
+        The platform file that a script is to use; None: the simulated platform.
 
     Signals
     -------
@@ -114,10 +121,12 @@ class RecorderPanel(QWidget):
         make: "Callable[[], ProcedureRecorder]",
         frames: Callable[[], tuple[str, ...]],
         folder: Callable[[], Path],
+        config: Path | None = None,
     ) -> None:
         super().__init__()
         self.setObjectName("recorderPanel")
         self._make, self._frames, self._folder = make, frames, folder
+        self._config = config
         self._recorder: ProcedureRecorder | None = None
         self._steps: list[RecordedStep] = []
         self._running = ""
@@ -137,6 +146,8 @@ class RecorderPanel(QWidget):
         self.frame.currentTextChanged.connect(self._on_frame)
         self.list = named(QListWidget(), "recordedSteps")
         self.list.setAccessibleName("Recorded steps, in order")
+        self.list.setToolTip("Double-click a step, or press Enter, to change its numbers")
+        self.list.itemActivated.connect(lambda _item: self.edit())
         self.list.setWordWrap(True)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.list.setMinimumHeight(8 * STEP_PX)
@@ -216,7 +227,7 @@ class RecorderPanel(QWidget):
         self.up.setEnabled(chosen and row > 0)
         self.down.setEnabled(chosen and row < count - 1)
         self.delete.setEnabled(chosen)
-        self.ask.setEnabled(chosen and bool(_numbers(self._steps[row])))
+        self.ask.setEnabled(chosen and bool(self._steps[row].numbers))
         self.save.setEnabled(bool(count))
         recording = self.record.isChecked()
         why_not = "" if count else "There are no steps yet"
@@ -241,9 +252,22 @@ class RecorderPanel(QWidget):
         """Have a replay ask for the numbers of the step, or no longer."""
         row = self.list.currentRow()
         step = self._steps[row]
-        words = {key: f"{step.words}: {key.replace('_', ' ')}" for key in _numbers(step)}
+        words = {key: text for key, (text, _) in _asked(step).items()}
         asking = step.model_copy(update={"ask": {} if step.ask else words})
         self._put([*self._steps[:row], asking, *self._steps[row + 1 :]], row)
+
+    def edit(self) -> None:
+        """Ask for the numbers of the step that is chosen, where it has some."""
+        row = self.list.currentRow()
+        asked = {(row, key): found for key, found in _asked(self._steps[row]).items()}
+        if asked:
+            dialog = self._asking("Change the step", asked)
+            dialog.accepted.connect(lambda: self._on_edited(row, dialog.values))
+
+    def _on_edited(self, row: int, values: dict[tuple[int, str], float]) -> None:
+        procedure = self._given(self.procedure, values)
+        if procedure is not None:
+            self._put(list(procedure.step), row)
 
     def add_wait(self, what: str) -> None:
         """Add a step that waits, behind the one that is chosen."""
@@ -330,7 +354,7 @@ class RecorderPanel(QWidget):
             return
         try:
             self.procedure.save(path)
-            self.procedure.save_python(path.with_suffix(".py"))
+            self.procedure.save_python(path.with_suffix(".py"), self._config)
         except OSError as exc:
             self.say(f"{state_look(State.ERROR).glyph} not saved: {exc}")
             return
@@ -360,18 +384,30 @@ class RecorderPanel(QWidget):
         if not procedure.asked:
             self.replay_requested.emit(procedure)
             return
-        dialog = ValuesDialog(procedure.asked, self)
+        dialog = self._asking("Replay", procedure.asked)
         dialog.accepted.connect(lambda: self._on_values(procedure, dialog.values))
+
+    def _asking(self, title: str, asked: dict[tuple[int, str], tuple[str, float]]) -> ValuesDialog:
+        dialog = ValuesDialog(title, asked, self)
         dialog.finished.connect(dialog.deleteLater)
-        dialog.show()
+        dialog.show()  # not modal: STOP can be clicked
+        return dialog
 
     def _on_values(
         self, procedure: "RecordedProcedure", values: dict[tuple[int, str], float]
     ) -> None:
+        given = self._given(procedure, values)
+        if given is not None:
+            self.replay_requested.emit(given)
+
+    def _given(
+        self, procedure: "RecordedProcedure", values: dict[tuple[int, str], float]
+    ) -> "RecordedProcedure | None":
         try:
-            self.replay_requested.emit(procedure.with_values(values))
+            return procedure.with_values(values)
         except CosmicError as exc:
             self.say(f"{state_look(State.REFUSED).glyph} {exc}")
+            return None
 
     def show_running(self, title: str) -> None:
         """Offer no replay while an operation runs, by its title; empty: none does."""
@@ -387,10 +423,8 @@ class RecorderPanel(QWidget):
             self.say(words)
 
 
-def _numbers(step: "RecordedStep") -> list[str]:
-    """Return the keys of a step whose values are single numbers."""
-    return [
-        key
-        for key, value in step.model_dump(exclude_none=True).items()
-        if isinstance(value, int | float) and not isinstance(value, bool)
-    ]
+def _asked(step: "RecordedStep") -> dict[str, tuple[str, float]]:
+    """Return the words and the value of each number of a step, by its key."""
+    from cosmic.autonomy.recorded.steps import NUMBERS
+
+    return {key: (f"{step.words}: {NUMBERS[key]}", value) for key, value in step.numbers.items()}
