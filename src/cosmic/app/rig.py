@@ -347,6 +347,22 @@ class Rig:
                 return each.name
         return ""
 
+    @property
+    def driving(self) -> str:
+        """Which of them moves axes by itself at the moment; empty where none does, or it pauses."""
+        if not self._shared.runs:
+            return ""
+        from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
+
+        at_rest = (CampaignPhase.READY, CampaignPhase.PAUSED)
+        for each in list(self._shared.runs):
+            if isinstance(each, Campaign):
+                if not each.over and each.phase not in at_rest:
+                    return A_CAMPAIGN
+            elif not each.over and each.state not in (RunState.READY, RunState.PAUSED):
+                return each.name
+        return ""
+
     def procedure(self, procedure: Procedure[W], work: W) -> ProcedureRun[W]:
         """Return a run of `procedure` that is ready to begin, in the platform's time.
 

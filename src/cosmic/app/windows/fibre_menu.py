@@ -82,6 +82,7 @@ class FibreOperations(QObject):
         self._shown: object = None
         self._worked = False
         self._title = ""
+        self._waits = False
         self._said_on: CameraView | None = None
         self._cameras, self._found_on = list(cameras), list[CameraView]()
         self.marked: MarkedFibre | None = None
@@ -121,6 +122,11 @@ class FibreOperations(QObject):
     def used(self) -> bool:
         """True once an operation was asked for: what carries them out is loaded."""
         return self._relay is not None
+
+    @property
+    def waits(self) -> bool:
+        """True while a replay waits for the operator."""
+        return self._waits
 
     @property
     def worked(self) -> bool:
@@ -276,6 +282,7 @@ class FibreOperations(QObject):
         self._start(title, run)
 
     def _on_asked(self, words: str) -> None:
+        self._waits = bool(words)
         self.waiting.emit(words)
 
     def go_on(self) -> None:

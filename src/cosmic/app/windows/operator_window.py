@@ -168,6 +168,7 @@ class OperatorWindow(CosmicServerGui):
             self.add_panel(SCENE, self._scene, right, scroll=False)
         gui.undo_planned.connect(self._scene.set_planned)
         gui.ask_while(self._what_runs)
+        gui.refuse_while(self._what_drives)
         self._parking = Parking(gui, self._is_moving, self)
         self._parking.failed.connect(lambda why: self.top_bar.set_message(f"not parked: {why}"))
         for asking in (self._closing, self._parking):
@@ -399,6 +400,14 @@ class OperatorWindow(CosmicServerGui):
         """Return what moves axes by itself, as a reason not to move them under it."""
         running = self._rig.running
         return f"{running} is running and moves axes itself" if running else ""
+
+    def _what_drives(self) -> str:
+        """Return what moves axes just now, as a reason to move nothing by hand; any thread."""
+        operations = self._tasks.operations if self._tasks is not None else None
+        if operations is not None and operations.waits:  # a replay has the operator do something
+            return ""
+        driving = self._rig.driving
+        return f"{driving} moves the axes; end or pause it first" if driving else ""
 
     def _is_moving(self) -> bool:
         """Tell whether Escape has something to stop."""

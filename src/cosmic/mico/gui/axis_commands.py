@@ -95,6 +95,8 @@ class AxisCommands(QObject):
         self._rested_at: float | None = None
         self._refused_wall_s = 0.0
         self._blocked: _Command | None = None
+        self.busy: Callable[[], str] = str
+        """Returns why the operator moves nothing now; empty where nothing speaks against it."""
         self.plans_detours = False
         """Have a detour planned where something stands in the way of a move to a goal.
 
@@ -138,6 +140,9 @@ class AxisCommands(QObject):
         self._issue(command)
 
     def _issue(self, command: _Command) -> None:
+        if why := self.busy():
+            self.refused.emit(command.field, why)
+            return
         self.abandon_series()
         self._newest = self._blocked = None
         self._moved = False
