@@ -161,7 +161,7 @@ def test_the_numbers_of_a_step_are_changed_in_the_list(panel: RecorderPanel, qtb
     assert panel.list.currentRow() == 1
 
 
-def test_what_an_operation_does_not_heed_is_not_asked_for(panel: RecorderPanel) -> None:
+def test_what_an_operation_does_not_use_is_not_asked_for(panel: RecorderPanel) -> None:
     panel.show_steps([OperationStep(operation=SingleOperation.TAKE, gripper="left")])
     assert not panel.ask.isEnabled()
     panel.edit()

@@ -80,7 +80,7 @@ def test_the_file_says_nothing_that_means_nothing(tmp_path: Path) -> None:
     ]
 
 
-def test_numbers_are_those_that_an_operation_heeds_and_counts_stay_whole() -> None:
+def test_numbers_are_those_that_an_operation_uses_and_counts_stay_whole() -> None:
     assert not OperationStep(operation=SingleOperation.TAKE, gripper="left").numbers
     assert OperationStep(operation=SingleOperation.PUSH).numbers == {"force_un": 50.0}
     lens = LensStep(focus_counts=4000, ask={"focus_counts": "Focus"})
