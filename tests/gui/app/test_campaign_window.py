@@ -109,7 +109,12 @@ def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
     make: Make, qtbot: QtBot, tmp_path: Path
 ) -> None:
     window = make(whole_platform())
+    assert window.tasks is not None
+    assert window.tasks.operations is not None
+    before = window.tasks.operations.card
+    before.show_refused("Put away", "left is empty")
     campaign = begun(window, qtbot, tmp_path)
+    assert before.isHidden(), "what it says holds no longer"
     cards = mico(window).cards.values()
 
     def moves(campaign: Campaign) -> bool:

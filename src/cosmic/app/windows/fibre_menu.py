@@ -290,6 +290,11 @@ class FibreOperations(QObject):
         if self._going_on is not None:
             self._going_on.give()
 
+    def close_card(self) -> None:
+        """Close the card of an operation that is over: what it says holds no longer."""
+        if not self.running:
+            self.card.hide()
+
     def close_gently(self, gripper: str) -> None:
         """Close the jaws of a gripper slowly, until they hold."""
         from cosmic.autonomy.shipped.single_operation import OperationRequest, SingleOperation

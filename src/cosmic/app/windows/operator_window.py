@@ -249,6 +249,8 @@ class OperatorWindow(CosmicServerGui):
         campaign = self._campaign
         if campaign is not None:
             self._tasks.campaigns = lambda: campaign.home
+            if self._tasks.operations is not None:
+                campaign.opened.connect(self._tasks.operations.close_card)
         self._tasks.add_coach(
             coach_rules(self, self._rig, self._mico_gui, self._tasks, self._campaign)
         )
