@@ -288,6 +288,8 @@ def test_a_key_moves_no_axis_under_an_operation_and_may_while_a_replay_waits(
     qtbot.keyPress(window, Qt.Key.Key_W)
     qtbot.keyRelease(window, Qt.Key.Key_W)
     assert refusals == ["take with left moves the axes; end or pause it first"]
+    assert window.top_bar.message == refusals[0]
+    qtbot.waitUntil(lambda: not window.top_bar.message, timeout=15_000)
     assert found.running
     qtbot.mouseClick(card.stop, LEFT)
     qtbot.waitUntil(lambda: not found.running, timeout=60_000)

@@ -66,6 +66,7 @@ class WindowBridge(QObject):
 CONSOLE: Final = "Console"
 SCENE: Final = "Scene"
 RATE_MS: Final = 1000
+_SAID_MS: Final = 5000
 
 _SHARES: Final = [3, 2]
 """How log and console share the width at a first start."""
@@ -169,6 +170,7 @@ class OperatorWindow(CosmicServerGui):
         gui.undo_planned.connect(self._scene.set_planned)
         gui.ask_while(self._what_runs)
         gui.refuse_while(self._what_drives)
+        gui.busy_refused.connect(self._on_busy_refused)
         self._parking = Parking(gui, self._is_moving, self)
         self._parking.failed.connect(lambda why: self.top_bar.set_message(f"not parked: {why}"))
         for asking in (self._closing, self._parking):
@@ -410,6 +412,15 @@ class OperatorWindow(CosmicServerGui):
             return ""
         driving = self._rig.driving
         return f"{driving} moves the axes; end or pause it first" if driving else ""
+
+    def _on_busy_refused(self, why: str) -> None:
+        """Say why a key moved nothing where it is seen in every workspace, for a while."""
+        self.top_bar.set_message(why, State.REFUSED)
+        QTimer.singleShot(_SAID_MS, self, lambda: self._forget_message(why))
+
+    def _forget_message(self, text: str) -> None:
+        if self.top_bar.message == text:
+            self.top_bar.set_message("")
 
     def _is_moving(self) -> bool:
         """Tell whether Escape has something to stop."""

@@ -75,8 +75,7 @@ class JogKeys(QObject):
     def _on_hold_started(self, key: str) -> None:
         jog = self._keys[key]
         axis, commands = jog.card.axis, jog.card.commands
-        if why := commands.busy():
-            commands.refused.emit(None, why)
+        if commands.refuse_busy():
             return
         commands.abandon_series()
         self._lost.pop(key, None)

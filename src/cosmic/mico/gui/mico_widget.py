@@ -88,6 +88,8 @@ class MicoWidget(QWidget):
         There may be other devices now.
     verdict_given(MoveVerdict)
         A command of this panel was refused, or a jog stopped in front of something.
+    busy_refused(str)
+        A command of this panel was refused as something else moves the axes; with what.
     refusal_over(str)
         What was refused for that axis holds no longer: it has moved since.
     undo_planned(object)
@@ -100,6 +102,7 @@ class MicoWidget(QWidget):
     failure_changed = Signal(str)
     refreshed = Signal()
     verdict_given = Signal(object)
+    busy_refused = Signal(str)
     refusal_over = Signal(str)
     undo_planned = Signal(object)
     detour_wanted = Signal(object)
@@ -322,6 +325,7 @@ class MicoWidget(QWidget):
             card.commands.detour_wanted.connect(self.detour_wanted)
             card.commands.plans_detours = self._plans_detours
             card.commands.busy = self._busy
+            card.commands.busy_refused.connect(self.busy_refused)
             card.show_stopped(self._stopped)
             if isinstance(card, ClosedLoopGUI):
                 join_links(card, self._mico)
