@@ -12,7 +12,7 @@ import pytest
 
 from cosmic.app.cli import main
 from cosmic.autonomy.bending.result import Contribution, Kind
-from cosmic.autonomy.campaign.formatting import budget_rows, length_words
+from cosmic.autonomy.campaign.formatting import budget_rows, length_words, with_interval
 from cosmic.autonomy.campaign.records import (
     CERTAIN,
     CalibrationNote,
@@ -292,3 +292,16 @@ def test_spans_that_are_not_those_of_the_result_cost_no_report(tmp_path: Path) -
         store.finish_fibre(replace(record, spans=(cut,)))
         write_report(store, tmp_path / "run" / "report.html")
     assert "Fibre 1" in (tmp_path / "run" / "report.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "text"),
+    [
+        (1.66, 0.0012, "1.660 ± 0.002"),
+        (1.66, 0.3, "1.66 ± 0.59"),
+        (1.66, 0.0, "1.66 ± 0.00"),
+        (1.66, math.nan, "1.66"),
+    ],
+)
+def test_an_interval_is_not_rounded_to_none(value: float, std: float, text: str) -> None:
+    assert with_interval(value, std, 2) == text
