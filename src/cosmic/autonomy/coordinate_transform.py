@@ -151,6 +151,8 @@ class PlatformTransform(CoordinateTransform):
             raise NotAvailable(
                 f"{running.title} is running; wait until it has ended, then click again"
             )
+        if why := self._mico.application.busy():
+            raise NotAvailable(why)
         tool = self._tool(what)
         x_um, y_um, z_um = self._point_um(image, point_px, tool)
         motions = self._reaching(tool, (x_um, y_um, z_um))
