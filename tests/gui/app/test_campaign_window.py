@@ -129,9 +129,11 @@ def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
     qtbot.waitUntil(lambda: words.text().startswith("A campaign runs"), timeout=10_000)
     button = coach.findChild(QPushButton, "coachButton")
     assert isinstance(button, QPushButton)
+    assert mico(window).busy == "a campaign moves the axes; end or pause it first"
     panel = panel_of(window, qtbot)
     qtbot.mouseClick(panel.procedure.pause, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: words.text().startswith("The campaign is paused"), timeout=60_000)
+    assert mico(window).busy == ""
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: words.text().startswith("A campaign runs"), timeout=10_000)
     assert "a campaign is running" in mico(window).undoing.doubt()
