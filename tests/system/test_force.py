@@ -171,6 +171,16 @@ def test_a_limit_needs_a_rate_that_is_fast_enough() -> None:
         assert "force" in rig.daqco.latest()
 
 
+def test_a_value_of_before_is_not_taken_for_one_of_now() -> None:
+    with cosmic.connect(rate=2.0, applications=("daqco",)) as rig:
+        wait_until(lambda: rig.daqco.latest_chunk is not None)
+        rig.daqco.stop()
+        stopped = "acquisition is stopped; the newest value is [0-9.]+ s old"
+        with pytest.raises(cosmic.NotAvailable, match=stopped):
+            rig.daqco.latest()
+        assert rig.daqco.latest_chunk is not None
+
+
 def test_a_board_that_was_lost_is_reported_and_acquires_again_when_it_is_back() -> None:
     with cosmic.connect(rate=2.0, applications=("daqco",)) as rig:
         faults = rig.daqco.application.library.faults  # type: ignore[attr-defined]

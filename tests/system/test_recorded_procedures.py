@@ -106,6 +106,21 @@ def test_a_replay_waits_for_the_operator_and_can_be_ended() -> None:
         assert rig.mico["left.x"].position_um == pytest.approx(-50.0, abs=1.0)
 
 
+def test_a_script_that_replays_asks_whether_to_go_on() -> None:
+    step = [WaitForOperatorStep(text="look"), MoveStep(axes={"left.x": -50.0})]
+    waiting = RecordedProcedure(name="wait", step=step)
+    with cosmic.connect(rate=20.0) as rig:
+        with pytest.raises(cosmic.NotAvailable, match="'Wait for key: look' waits for an operator"):
+            rig.replay(waiting)
+        with pytest.raises(OperationFailed, match="Wait for key: look: it was not to go on"):
+            rig.replay(waiting, confirm=lambda _words: False).run_here()
+        assert rig.mico["left.x"].position_um == pytest.approx(0.0, abs=1.0)
+        asked: list[str] = []
+        rig.replay(waiting, confirm=lambda words: not asked.append(words)).run_here()
+        assert asked == ["Wait for key: look"]
+        assert rig.mico["left.x"].position_um == pytest.approx(-50.0, abs=1.0)
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_what_was_done_with_one_fibre_is_done_with_another_at_another_force(

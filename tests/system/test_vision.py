@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import copytree
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import numpy.typing as npt
@@ -347,6 +348,11 @@ def test_a_click_that_the_gate_refuses_moves_nothing(lab: Lab) -> None:
         lab.rig.reset_stop()
     with pytest.raises(cosmic.NotAvailable):
         camera.click_to_move((1000.0, 500.0), "left")
+    with (
+        patch.object(lab.rig.mico.application, "busy", lambda: "a campaign moves the axes"),
+        pytest.raises(cosmic.NotAvailable, match="a campaign moves the axes"),
+    ):
+        camera.click_to_move((1000.0, 500.0), "right")
     with pytest.raises(cosmic.ConfigError, match="there is no tool"):
         camera.click_to_move((1000.0, 500.0), "nobody")
     assert at_right(lab.rig) == pytest.approx(stood, abs=0.5)

@@ -284,6 +284,7 @@ class Rig:
         marked: "MarkedFibre | None" = None,
         *,
         folder: str | Path = ".",
+        confirm: Callable[[str], bool] | None = None,
     ) -> "ProcedureRun[HandlingContext]":
         """Return a run that replays a recorded procedure; begin it by `run_here` or `start`.
 
@@ -295,6 +296,9 @@ class Rig:
             The fibre it is replayed on; None: where it needs one, the first that is certain.
         folder : path
             Where its recordings go.
+        confirm : callable
+            Asked in words, in the thread of the run, where a step waits for the operator: whether
+            to go on. Needed where one does.
 
         Raises
         ------
@@ -303,7 +307,7 @@ class Rig:
         ArgumentError
             `folder` is empty, or no file can be called so.
         NotAvailable
-            Something else runs, or no fibre is seen.
+            Something else runs, no fibre is seen, or a step waits for an operator whom nobody asks.
         """
         check_named("folder", folder)
         from cosmic.autonomy.recorded.operations import Surroundings
@@ -317,9 +321,15 @@ class Rig:
                     f"{type(procedure).__name__}"
                 )
             procedure = load_recorded(Path(procedure))
+        if procedure.waits and confirm is None:
+            raise NotAvailable(
+                f"{procedure.name}: {procedure.waits!r} waits for an operator; pass confirm"
+            )
         if marked is None and procedure.needs_fibre:
             marked = mark_one(self)
         around = Surroundings(marked, folder=lambda: Path(folder))
+        if confirm is not None:
+            around.ask(confirm)
         return replay_on(self.handling, procedure, around)
 
     @property
@@ -334,6 +344,22 @@ class Rig:
                 if not each.over and each.phase is not CampaignPhase.READY:
                     return A_CAMPAIGN
             elif not each.over and each.state is not RunState.READY:
+                return each.name
+        return ""
+
+    @property
+    def driving(self) -> str:
+        """Which of them moves axes by itself at the moment; empty where none does, or it pauses."""
+        if not self._shared.runs:
+            return ""
+        from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
+
+        at_rest = (CampaignPhase.READY, CampaignPhase.PAUSED)
+        for each in list(self._shared.runs):
+            if isinstance(each, Campaign):
+                if not each.over and each.phase not in at_rest:
+                    return A_CAMPAIGN
+            elif not each.over and each.state not in (RunState.READY, RunState.PAUSED):
                 return each.name
         return ""
 

@@ -39,6 +39,7 @@ from cosmic.vico.core.vision.algorithms import (
 from cosmic.vico.core.vision.tool_types import ExpectedTool
 
 logger = logging.getLogger(__name__)
+NO_TABLE: Final = "no axis turns the plate; name it as vico.table_axis in the platform file"
 
 SOURCE: Final = "click"
 REACH_PX: Final = 40.0
@@ -150,6 +151,8 @@ class PlatformTransform(CoordinateTransform):
             raise NotAvailable(
                 f"{running.title} is running; wait until it has ended, then click again"
             )
+        if why := self._mico.application.busy():
+            raise NotAvailable(why)
         tool = self._tool(what)
         x_um, y_um, z_um = self._point_um(image, point_px, tool)
         motions = self._reaching(tool, (x_um, y_um, z_um))
@@ -268,7 +271,7 @@ class PlatformTransform(CoordinateTransform):
     def find_rotation_centre(self, camera: str) -> Task:
         axis = self._vico.settings.table_axis
         if not axis:
-            raise NotAvailable("no axis turns the plate; name it as vico.table_axis")
+            raise NotAvailable(NO_TABLE)
         procedure = RotationProcedure(
             self._vico, self._mico, self.calibrations, self._plate_map, camera, axis
         )

@@ -109,7 +109,12 @@ def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
     make: Make, qtbot: QtBot, tmp_path: Path
 ) -> None:
     window = make(whole_platform())
+    assert window.tasks is not None
+    assert window.tasks.operations is not None
+    before = window.tasks.operations.card
+    before.show_refused("Put away", "left is empty")
     campaign = begun(window, qtbot, tmp_path)
+    assert before.isHidden(), "what it says holds no longer"
     cards = mico(window).cards.values()
 
     def moves(campaign: Campaign) -> bool:
@@ -124,9 +129,11 @@ def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
     qtbot.waitUntil(lambda: words.text().startswith("A campaign runs"), timeout=10_000)
     button = coach.findChild(QPushButton, "coachButton")
     assert isinstance(button, QPushButton)
+    assert mico(window).busy == "a campaign moves the axes; end or pause it first"
     panel = panel_of(window, qtbot)
     qtbot.mouseClick(panel.procedure.pause, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: words.text().startswith("The campaign is paused"), timeout=60_000)
+    assert mico(window).busy == ""
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: words.text().startswith("A campaign runs"), timeout=10_000)
     assert "a campaign is running" in mico(window).undoing.doubt()

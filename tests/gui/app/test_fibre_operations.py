@@ -19,7 +19,7 @@ from cosmic.app.windows.tasks import HANDLE, MEASURE, TaskLayout
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.recorded.operations import Surroundings
 from cosmic.autonomy.recorded.replay import replay_on
-from cosmic.autonomy.recorded.steps import MoveStep, RecordedProcedure
+from cosmic.autonomy.recorded.steps import MoveStep, RecordedProcedure, WaitForOperatorStep
 from cosmic.daqco.gui.main_widget import make_daqco_gui
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import State
@@ -253,6 +253,57 @@ def test_an_operation_that_the_operator_ends_is_no_error(make: Make, qtbot: QtBo
     qtbot.waitUntil(card.close_button.isVisible)
     assert card.badge.word == "ENDED"
     assert card.line.text() == "It was ended by the operator."
+
+
+def test_what_is_asked_for_while_an_operation_runs_is_refused_and_leaves_its_card(
+    make: Make, qtbot: QtBot, tmp_path: Path
+) -> None:
+    window = with_fibres(make, qtbot)
+    found = operations(window)
+    card = take(window, qtbot)
+    view = tasks(window).central_view.camera
+    found.replay(RecordedProcedure(name="again", step=[]), lambda: tmp_path)
+    assert view.message.text == "Replay again: take with left is running; end it first"
+    found.close_gently("right")
+    assert "is running" in view.message.text
+    assert (card.badge.state, card.title.text()) == (State.BUSY, "Take with left")
+    assert card.stop.isVisible()
+    assert found.title == "Take with left"
+    qtbot.mouseClick(card.stop, LEFT)
+    qtbot.waitUntil(lambda: not found.running, timeout=60_000)
+    qtbot.waitUntil(card.close_button.isVisible)
+    assert view.message.text == ""
+    assert found.title == ""
+
+
+def test_a_key_moves_no_axis_under_an_operation_and_may_while_a_replay_waits(
+    make: Make, qtbot: QtBot, tmp_path: Path
+) -> None:
+    window = with_fibres(make, qtbot)
+    found = operations(window)
+    card = take(window, qtbot)
+    refusals: list[str] = []
+    commands = mico(window).cards["left.y"].commands
+    commands.refused.connect(lambda _field, why: refusals.append(why))
+    qtbot.keyPress(window, Qt.Key.Key_W)
+    qtbot.keyRelease(window, Qt.Key.Key_W)
+    assert refusals == ["take with left moves the axes; end or pause it first"]
+    assert window.top_bar.message == refusals[0]
+    qtbot.waitUntil(lambda: not window.top_bar.message, timeout=15_000)
+    assert found.running
+    qtbot.mouseClick(card.stop, LEFT)
+    qtbot.waitUntil(lambda: not found.running, timeout=60_000)
+    waiting = RecordedProcedure(name="by hand", step=[WaitForOperatorStep()])
+    found.replay(waiting, lambda: tmp_path)
+    qtbot.waitUntil(lambda: found.waits)
+    axis = mico(window).cards["left.y"].axis
+    before = axis.position_um
+    qtbot.keyPress(window, Qt.Key.Key_W)
+    qtbot.waitUntil(lambda: axis.position_um > before + 5.0)
+    qtbot.keyRelease(window, Qt.Key.Key_W)
+    found.go_on()
+    qtbot.waitUntil(lambda: not found.running, timeout=60_000)
+    assert len(refusals) == 1
 
 
 def test_after_an_operation_that_failed_the_coach_zooms_out(make: Make, qtbot: QtBot) -> None:

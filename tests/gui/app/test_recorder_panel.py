@@ -9,6 +9,7 @@ from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.recorded import RecorderPanel, ValuesDialog
 from cosmic.autonomy.recorded.steps import (
+    LensStep,
     LightStep,
     MoveStep,
     OperationStep,
@@ -100,12 +101,6 @@ def test_a_procedure_is_saved_as_a_file_and_as_python_and_opened_again(
     assert texts(panel) == ["1  Light 40 %"]
     panel.open_file(tmp_path / "none.toml")
     assert "none.toml" in panel.line.toolTip()
-    panel.show_waiting("Wait for key")
-    assert panel.go_on.isVisible()
-    assert panel.line.text() == "Wait for key"
-    panel.show_waiting("")
-    assert not panel.go_on.isVisible()
-    assert panel.line.text() == ""
 
 
 def test_the_script_never_takes_the_place_of_the_procedure(
@@ -124,3 +119,50 @@ def test_noting_is_said_only_while_steps_are_noted(
     assert "Noting" in panel.line.text()
     qtbot.mouseClick(panel.record, LEFT)
     assert panel.line.text() == ""
+
+
+def test_continue_is_offered_where_it_stands_and_moves_nothing_under_the_mouse(
+    panel: RecorderPanel,
+) -> None:
+    panel.show_steps([LightStep(percent=40.0)])
+    buttons = (panel.go_on, panel.replay, panel.save, panel.add)
+    before = [each.geometry() for each in buttons]
+    assert not panel.go_on.isEnabled()
+    panel.show_waiting("Wait for key")
+    assert panel.go_on.isEnabled()
+    assert panel.line.text() == "Wait for key"
+    panel.grab()  # lays it out
+    assert [each.geometry() for each in buttons] == before
+    panel.show_waiting("")
+    assert not panel.go_on.isEnabled()
+    assert panel.line.text() == ""
+
+
+def test_no_replay_is_offered_while_an_operation_runs(panel: RecorderPanel) -> None:
+    panel.show_steps([LightStep(percent=40.0)])
+    panel.show_running("Take with left")
+    assert not panel.replay.isEnabled()
+    assert panel.replay.toolTip() == "Take with left is running; end it first"
+    panel.show_running("")
+    assert panel.replay.isEnabled()
+
+
+def test_the_numbers_of_a_step_are_changed_in_the_list(panel: RecorderPanel, qtbot: QtBot) -> None:
+    panel.show_steps([LightStep(percent=40.0), LensStep(zoom=2.0, focus_counts=4000)])
+    panel.list.setFocus()
+    panel.list.itemActivated.emit(panel.list.item(1))  # by a double click, or Enter
+    dialog = panel.findChild(ValuesDialog)
+    assert dialog is not None
+    zoom, focus = dialog.fields
+    zoom.setText("1")
+    focus.setText("3900")
+    qtbot.mouseClick(dialog.buttons.button(QDialogButtonBox.StandardButton.Ok), LEFT)
+    assert texts(panel) == ["1  Light 40 %", "2  Lens: zoom 1x, focus 3900 counts"]
+    assert panel.list.currentRow() == 1
+
+
+def test_what_an_operation_does_not_use_is_not_asked_for(panel: RecorderPanel) -> None:
+    panel.show_steps([OperationStep(operation=SingleOperation.TAKE, gripper="left")])
+    assert not panel.ask.isEnabled()
+    panel.edit()
+    assert panel.findChild(ValuesDialog) is None

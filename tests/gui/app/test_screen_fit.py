@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import pytest
-from PySide6.QtCore import QPoint, QRect, QSettings, Qt
+from PySide6.QtCore import QPoint, QRect, QSettings, QSize, Qt
 from PySide6.QtWidgets import QApplication, QDialog, QDockWidget, QScrollArea, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -51,6 +51,21 @@ def test_the_window_opens_no_larger_than_the_screen_and_shows_stop(
     window = make(applications=("mico", "daqco", "vico"), hardware=False, size=(2040, 1137))
     qtbot.waitUntil(lambda: on(room, window), timeout=5000)
     assert stop_is_seen(window, room)
+
+
+def test_the_workspaces_are_made_no_smaller_than_they_fit_into(
+    make: Make, qtbot: QtBot, screen: Screen
+) -> None:
+    screen(QRect(0, 0, 1920, 1080))
+    window = make(applications=("mico", "daqco", "vico"), hardware=False, size=(1366, 768))
+    qtbot.waitUntil(lambda: window.minimumSize() == QSize(1024, 600), timeout=5000)
+    window.resize(600, 300)
+    assert window.size() == QSize(1024, 600)
+    tiny = QRect(0, 0, 900, 500)
+    screen(tiny)  # another resolution: STOP is seen on that one, too
+    window.screen().availableGeometryChanged.emit(tiny)
+    qtbot.waitUntil(lambda: on(tiny, window), timeout=5000)
+    assert stop_is_seen(window, tiny)
 
 
 @pytest.mark.parametrize("application", ["mico", "daqco", "vico"])

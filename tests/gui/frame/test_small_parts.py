@@ -77,6 +77,19 @@ def test_a_note_that_was_clicked_away_comes_back_only_where_it_is_asked_for(qtbo
     assert note.isVisible()
 
 
+def test_a_note_is_read_as_a_whole_in_a_short_dialog(qtbot):
+    window = QWidget()
+    qtbot.addWidget(window)
+    window.resize(220, 100)
+    field = QLineEdit(window)
+    field.move(100, 20)
+    window.show()
+    show_refusal(field, "'0,04 mN' is not a number, and what is said of it takes three lines here")
+    note = ReasonBubble.of(field)
+    assert note.isVisible()
+    assert window.rect().contains(note.geometry())
+
+
 def test_widgets_go_on_in_a_new_line_where_it_is_narrow(qtbot):
     window = QWidget()
     qtbot.addWidget(window)

@@ -174,3 +174,29 @@ def test_a_click_is_one_move_and_no_jog(slow: MicoWidget, qtbot: QtBot) -> None:
     card = slow.cards["left.x"]
     click(qtbot, card, "MiCoCL_6")
     qtbot.waitUntil(lambda: abs(position(card) - 100.0) < 1.0 and at_rest(slow, "left.x"))
+
+
+def test_while_something_else_moves_the_axes_no_key_and_no_button_moves_one(
+    slow: MicoWidget, qtbot: QtBot
+) -> None:
+    hold(qtbot, slow, Qt.Key.Key_D, "left.x")
+    card = slow.cards["left.x"]
+    slow.refuse_while(lambda: "a campaign moves the axes")
+    line = part(card, "status", QLabel)
+    qtbot.waitUntil(lambda: "the jog ended: a campaign moves the axes" in line.text())
+    qtbot.waitUntil(lambda: at_rest(slow, "left.x"))
+    there = position(card)
+    qtbot.keyRelease(slow.focusWidget(), Qt.Key.Key_D)
+    refusals: list[str] = []
+    card.commands.refused.connect(lambda _field, why: refusals.append(why))
+    qtbot.keyPress(slow.focusWidget(), Qt.Key.Key_A)
+    qtbot.keyRelease(slow.focusWidget(), Qt.Key.Key_A)
+    click(qtbot, card, "MiCoCL_6")
+    assert refusals == ["a campaign moves the axes"] * 2
+    assert at_rest(slow, "left.x")
+    assert position(card) == there
+    slow.refuse_while(str)
+    part(slow, "initialise", QPushButton).setFocus()  # the field that was refused has it
+    hold(qtbot, slow, Qt.Key.Key_W, "left.y")
+    qtbot.keyRelease(slow.focusWidget(), Qt.Key.Key_W)
+    qtbot.waitUntil(lambda: at_rest(slow, "left.y"))

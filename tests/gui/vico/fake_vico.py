@@ -9,7 +9,7 @@ import numpy as np
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.operation import Operation, Task
-from cosmic.vico.api.coordinate_transform import CalibrationShown
+from cosmic.vico.api.coordinate_transform import CalibrationShown, RotationShown
 from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.core.measuring.corrections import Corrections
 from cosmic.vico.core.vision.tool_tips import HeldSeen
@@ -151,6 +151,7 @@ class FakeCamera:
         self.calibration_problem = "not calibrated at this zoom: run the calibration"
         self.scale_um_px: float | None = 1.25
         self.calibrated: tuple[CalibrationShown, ...] = ()
+        self.rotation: RotationShown | None = None
         self.targets: tuple[str, ...] = ("left gripper", "right gripper")
         self.refuse = ""
         self.refuse_later = ""

@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from cosmic.frame.errors import NotAvailable
-from cosmic.vico.api.coordinate_transform import CalibrationShown
+from cosmic.vico.api.coordinate_transform import CalibrationShown, RotationShown
 from cosmic.vico.gui.calibrate_menu import CalibrateButton
 
 NOW = datetime(2026, 11, 21, 12, 0, tzinfo=UTC)
@@ -52,7 +52,11 @@ def test_what_is_calibrated_is_listed_with_its_age(button, camera):
     camera.calibrated = (
         CalibrationShown("top", "left", 5964.0, 50.0, 2.1977, 0.12, NOW - timedelta(hours=2)),
     )
-    (line,) = button.lines()
+    camera.rotation = RotationShown(
+        "table.rotation", (1.02, -1.7), 0.1, 0.4, NOW - timedelta(seconds=10)
+    )
+    line, turns = button.lines()
+    assert turns.startswith("rotation centre: x 1.0, y -1.7 µm, known to 0.1 µm; 10")
     assert line.startswith("left: 2.198 µm a pixel at zoom 5964, height 50 µm; 0.12 px off, 2 h")
     assert not actions(button)[line].isEnabled()
 

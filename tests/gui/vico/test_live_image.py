@@ -125,6 +125,18 @@ def test_dragging_pans_and_the_part_stays_for_the_next_image(qtbot, shown, mouse
     assert shown.view.pixel_at(QPointF(100, 100)) == pytest.approx(after)
 
 
+def test_dragging_pans_also_after_a_menu_has_swallowed_the_right_button_coming_up(
+    qtbot, shown, mouse
+):
+    click(qtbot, shown.row.one_to_one)
+    view = shown.view
+    scale, before = view.zoom, view.pixel_at(QPointF(100, 100))
+    qtbot.mousePress(view.viewport(), Qt.MouseButton.RightButton, pos=QPoint(200, 200))
+    mouse.drag((800, 600), (1000, 700))
+    assert view.zoom == pytest.approx(scale)
+    assert view.pixel_at(QPointF(100, 100))[0] == pytest.approx(before[0] - 200, abs=16)
+
+
 def test_the_wheel_zooms_about_the_point_below_the_mouse(qtbot, shown, camera):
     place = QPointF(300.0, 200.0)
     before, zoom = shown.view.pixel_at(place), shown.view.zoom

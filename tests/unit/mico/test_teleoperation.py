@@ -438,3 +438,19 @@ def test_a_controller_that_is_lost_while_it_is_steered_ends_the_steering():
         wait_until(lambda: it.phase is Phase.STOPPED)
         assert "device 0 does not answer" in it.teleoperation.state.reason
         wait_until(lambda: it.hand.closed == 1)
+
+
+def test_nothing_is_steered_while_something_else_moves_the_axes():
+    with rig() as it:
+        it.start()
+        it.push()
+        busy_s = WALL.now_s()
+        it.api.application.busy = lambda: "a campaign moves the axes"
+        wait_until(lambda: it.controller.stopped_after(busy_s) is not None)
+        it.stands()
+        assert it.teleoperation.state.refused == {"d0.c0": "a campaign moves the axes"}
+        it.api.application.busy = str
+        it.stands()  # the stick was not at rest meanwhile
+        it.hand.axes["x"] = 0.0
+        wait_until(lambda: not it.teleoperation.state.refused)
+        it.push()

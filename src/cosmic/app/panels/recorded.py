@@ -42,19 +42,24 @@ _USUAL_PAUSE_S: Final = 1.0
 
 
 class ValuesDialog(QDialog):
-    """Asks for the values that a replay is to have.
+    """Asks for the values that a replay, or a step, is to have.
 
     Parameters
     ----------
+    title : str
+        What they are for.
     asked : dict
         By step and key: the words, and the value recorded.
     """
 
     def __init__(
-        self, asked: dict[tuple[int, str], tuple[str, float]], parent: QWidget | None = None
+        self,
+        title: str,
+        asked: dict[tuple[int, str], tuple[str, float]],
+        parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Replay")
+        self.setWindowTitle(title)
         self._fields: dict[tuple[int, str], ValueField] = {}
         form = QFormLayout()
         for key, (words, value) in asked.items():
@@ -97,6 +102,8 @@ class RecorderPanel(QWidget):
         Returns what points can be relative to.
     folder : callable
         Returns where files are kept.
+    config : Path or None
+        The platform file that a script is to use; None: the simulated platform.
 
     Signals
     -------
@@ -114,12 +121,15 @@ class RecorderPanel(QWidget):
         make: "Callable[[], ProcedureRecorder]",
         frames: Callable[[], tuple[str, ...]],
         folder: Callable[[], Path],
+        config: Path | None = None,
     ) -> None:
         super().__init__()
         self.setObjectName("recorderPanel")
         self._make, self._frames, self._folder = make, frames, folder
+        self._config = config
         self._recorder: ProcedureRecorder | None = None
         self._steps: list[RecordedStep] = []
+        self._running = ""
         self._look = QTimer(self, interval=LOOK_MS)
         self._look.timeout.connect(self.look)
         self._make_widgets()
@@ -127,6 +137,7 @@ class RecorderPanel(QWidget):
         self._show_buttons()
 
     def _make_widgets(self) -> None:
+        self.line = named(ElidedLabel(), "recorderLine")
         self.record = named(push_button("● Record steps", ""), "recordSteps")
         self.record.setCheckable(True)
         self.record.toggled.connect(self._on_record)
@@ -135,6 +146,8 @@ class RecorderPanel(QWidget):
         self.frame.currentTextChanged.connect(self._on_frame)
         self.list = named(QListWidget(), "recordedSteps")
         self.list.setAccessibleName("Recorded steps, in order")
+        self.list.setToolTip("Double-click a step, or press Enter, to change its numbers")
+        self.list.itemActivated.connect(lambda _item: self.edit())
         self.list.setWordWrap(True)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.list.setMinimumHeight(8 * STEP_PX)
@@ -153,10 +166,9 @@ class RecorderPanel(QWidget):
         self.open = self._button("Open…", "Open a procedure that was saved", self._on_open)
         self.replay = named(push_button("Replay", ""), "replaySteps")
         self.replay.clicked.connect(self.request_replay)
-        self.go_on = named(push_button("Continue", "Go on with the replay"), "continueReplay")
+        self.go_on = named(push_button("Continue", ""), "continueReplay")
         self.go_on.clicked.connect(self.continued)
-        self.go_on.hide()
-        self.line = named(ElidedLabel(), "recorderLine")
+        self.show_waiting("")
 
     @staticmethod
     def _button(text: str, tip: str, act: Callable[[], None]) -> QPushButton:
@@ -174,7 +186,8 @@ class RecorderPanel(QWidget):
         grid.setSpacing(STEP_PX // 2)
         grid.addWidget(self.save, 0, 0)
         grid.addWidget(self.open, 0, 1)
-        grid.addWidget(self.replay, 1, 0, 1, 2)
+        grid.addWidget(self.replay, 1, 0)
+        grid.addWidget(self.go_on, 1, 1)
         boxes: tuple[QWidget, ...] = (self.frame, self.name)
         for box in boxes:
             box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
@@ -184,7 +197,7 @@ class RecorderPanel(QWidget):
         column.addWidget(self.record)
         column.addWidget(self.frame)
         column.addWidget(self.list, 1)
-        below: tuple[QWidget, ...] = (edits, self.name, files, self.go_on, self.line)
+        below: tuple[QWidget, ...] = (edits, self.name, files, self.line)
         for widget in below:
             column.addWidget(widget)
 
@@ -214,12 +227,13 @@ class RecorderPanel(QWidget):
         self.up.setEnabled(chosen and row > 0)
         self.down.setEnabled(chosen and row < count - 1)
         self.delete.setEnabled(chosen)
-        self.ask.setEnabled(chosen and bool(_numbers(self._steps[row])))
+        self.ask.setEnabled(chosen and bool(self._steps[row].numbers))
         self.save.setEnabled(bool(count))
         recording = self.record.isChecked()
-        self.replay.setEnabled(bool(count) and not recording)
-        tip = "End the recording of steps first" if recording else "Carry the steps out, in order"
-        self.replay.setToolTip(tip if count else "There are no steps yet")
+        why_not = "" if count else "There are no steps yet"
+        why_not = why_not or ("End the recording of steps first" if recording else self._running)
+        self.replay.setEnabled(not why_not)
+        self.replay.setToolTip(why_not or "Carry the steps out, in order")
         self.record.setToolTip(
             "End the recording of steps" if recording else "Note what is moved, lit and measured"
         )
@@ -238,9 +252,22 @@ class RecorderPanel(QWidget):
         """Have a replay ask for the numbers of the step, or no longer."""
         row = self.list.currentRow()
         step = self._steps[row]
-        words = {key: f"{step.words}: {key.replace('_', ' ')}" for key in _numbers(step)}
+        words = {key: text for key, (text, _) in _asked(step).items()}
         asking = step.model_copy(update={"ask": {} if step.ask else words})
         self._put([*self._steps[:row], asking, *self._steps[row + 1 :]], row)
+
+    def edit(self) -> None:
+        """Ask for the numbers of the step that is chosen, where it has some."""
+        row = self.list.currentRow()
+        asked = {(row, key): found for key, found in _asked(self._steps[row]).items()}
+        if asked:
+            dialog = self._asking("Change the step", asked)
+            dialog.accepted.connect(lambda: self._on_edited(row, dialog.values))
+
+    def _on_edited(self, row: int, values: dict[tuple[int, str], float]) -> None:
+        procedure = self._given(self.procedure, values)
+        if procedure is not None:
+            self._put(list(procedure.step), row)
 
     def add_wait(self, what: str) -> None:
         """Add a step that waits, behind the one that is chosen."""
@@ -327,7 +354,7 @@ class RecorderPanel(QWidget):
             return
         try:
             self.procedure.save(path)
-            self.procedure.save_python(path.with_suffix(".py"))
+            self.procedure.save_python(path.with_suffix(".py"), self._config)
         except OSError as exc:
             self.say(f"{state_look(State.ERROR).glyph} not saved: {exc}")
             return
@@ -357,31 +384,47 @@ class RecorderPanel(QWidget):
         if not procedure.asked:
             self.replay_requested.emit(procedure)
             return
-        dialog = ValuesDialog(procedure.asked, self)
+        dialog = self._asking("Replay", procedure.asked)
         dialog.accepted.connect(lambda: self._on_values(procedure, dialog.values))
+
+    def _asking(self, title: str, asked: dict[tuple[int, str], tuple[str, float]]) -> ValuesDialog:
+        dialog = ValuesDialog(title, asked, self)
         dialog.finished.connect(dialog.deleteLater)
-        dialog.show()
+        dialog.show()  # not modal: STOP can be clicked
+        return dialog
 
     def _on_values(
         self, procedure: "RecordedProcedure", values: dict[tuple[int, str], float]
     ) -> None:
+        given = self._given(procedure, values)
+        if given is not None:
+            self.replay_requested.emit(given)
+
+    def _given(
+        self, procedure: "RecordedProcedure", values: dict[tuple[int, str], float]
+    ) -> "RecordedProcedure | None":
         try:
-            self.replay_requested.emit(procedure.with_values(values))
+            return procedure.with_values(values)
         except CosmicError as exc:
             self.say(f"{state_look(State.REFUSED).glyph} {exc}")
+            return None
+
+    def show_running(self, title: str) -> None:
+        """Offer no replay while an operation runs, by its title; empty: none does."""
+        self._running = f"{title} is running; end it first" if title else ""
+        self._show_buttons()
 
     def show_waiting(self, words: str) -> None:
         """Offer to go on with a replay that waits; empty: it waits no longer."""
-        waited = self.go_on.isVisibleTo(self)
-        self.go_on.setVisible(bool(words))
+        waited = self.go_on.isEnabled()
+        self.go_on.setEnabled(bool(words))
+        self.go_on.setToolTip("Go on with the replay" if words else "No replay waits for you")
         if words or waited:
             self.say(words)
 
 
-def _numbers(step: "RecordedStep") -> list[str]:
-    """Return the keys of a step whose values are single numbers."""
-    return [
-        key
-        for key, value in step.model_dump(exclude_none=True).items()
-        if isinstance(value, int | float) and not isinstance(value, bool)
-    ]
+def _asked(step: "RecordedStep") -> dict[str, tuple[str, float]]:
+    """Return the words and the value of each number of a step, by its key."""
+    from cosmic.autonomy.recorded.steps import NUMBERS
+
+    return {key: (f"{step.words}: {NUMBERS[key]}", value) for key, value in step.numbers.items()}

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 
 from cosmic.app.panels.gripper_row import GripperRow
 from cosmic.app.panels.pose_choice import PoseChoice
-from cosmic.frame.errors import CosmicError
+from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.gui.build import named, push_button, styled, tight_row, tipped
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.relay import Relay
@@ -487,6 +487,8 @@ class ToolPanel(QWidget):
         }
         if len(wanted) == 1:
             self.move_to_target(next(iter(wanted)))
+        elif wanted and self._gui.busy:
+            self._refuse(self._gui.busy)
         elif wanted:
             self.say("")
             try:
@@ -509,6 +511,8 @@ class ToolPanel(QWidget):
 
     def _on_go_pose(self) -> None:
         try:
+            if why := self._gui.busy:
+                raise NotAvailable(why)
             task = self._mico.poses.go(self.poses.currentText(), wait=False)
         except CosmicError as exc:
             self._refuse(str(exc))

@@ -81,6 +81,9 @@ class FibreOperations(QObject):
         self._relay: Relay[()] | None = None
         self._shown: object = None
         self._worked = False
+        self._title = ""
+        self._waits = False
+        self._said_on: CameraView | None = None
         self._cameras, self._found_on = list(cameras), list[CameraView]()
         self.marked: MarkedFibre | None = None
         self.offered: Callable[[], RecordedProcedure | None] = _nothing
@@ -111,9 +114,19 @@ class FibreOperations(QObject):
         return self.used and self.handling.running
 
     @property
+    def title(self) -> str:
+        """Title of the operation that runs; empty for none."""
+        return self._title if self.running else ""
+
+    @property
     def used(self) -> bool:
         """True once an operation was asked for: what carries them out is loaded."""
         return self._relay is not None
+
+    @property
+    def waits(self) -> bool:
+        """True while a replay waits for the operator."""
+        return self._waits
 
     @property
     def worked(self) -> bool:
@@ -222,17 +235,27 @@ class FibreOperations(QObject):
         try:
             run = self.handling.prepare(request)
         except CosmicError as exc:
-            self.card.show_refused(request.title, str(exc).removeprefix(f"{request.title}: "))
-            self._offer_next()
-            self.ended.emit()
+            self._refuse(request.title, str(exc).removeprefix(f"{request.title}: "))
             return
         self._start(request.title, run)
+
+    def _refuse(self, title: str, why: str) -> None:
+        """Say why an operation does not begin; the card of one that runs stays, with End."""
+        if self.running:
+            self._said_on = self._central_view.camera
+            self._said_on.say(f"{title}: {why}")
+            return
+        self.card.show_refused(title, why)
+        if self.used:
+            self._offer_next()
+        self.ended.emit()
 
     def _start(self, title: str, run: "ProcedureRun[HandlingContext]") -> None:
         self._found_on = [view for view in self._cameras if self.finding(view)]
         for view in self._found_on:  # what an operation looks for, it finds by itself
             self.find(view, on=False)
         self._worked = True
+        self._title = title
         self.card.follow(title, run)
         run.start()
         self.began.emit(title)
@@ -253,19 +276,24 @@ class FibreOperations(QObject):
         try:
             run = replay_on(self.handling, procedure, around)
         except CosmicError as exc:
-            self.card.show_refused(title, str(exc))
-            self.ended.emit()
+            self._refuse(title, str(exc).removeprefix(f"{procedure.name}: "))
             return
         self._going_on = around.going_on
         self._start(title, run)
 
     def _on_asked(self, words: str) -> None:
+        self._waits = bool(words)
         self.waiting.emit(words)
 
     def go_on(self) -> None:
         """Have a replay that waits for the operator go on."""
         if self._going_on is not None:
             self._going_on.give()
+
+    def close_card(self) -> None:
+        """Close the card of an operation that is over: what it says holds no longer."""
+        if not self.running:
+            self.card.hide()
 
     def close_gently(self, gripper: str) -> None:
         """Close the jaws of a gripper slowly, until they hold."""
@@ -308,6 +336,9 @@ class FibreOperations(QObject):
         for view in self._found_on:
             self.find(view, on=True)
         self._found_on = []
+        if self._said_on is not None:
+            self._said_on.say("")
+        self._said_on = None
         self.card.show_result(result)
         self._offer_next()
         self.ended.emit()

@@ -66,6 +66,7 @@ class WindowBridge(QObject):
 CONSOLE: Final = "Console"
 SCENE: Final = "Scene"
 RATE_MS: Final = 1000
+_SAID_MS: Final = 5000
 
 _SHARES: Final = [3, 2]
 """How log and console share the width at a first start."""
@@ -168,6 +169,8 @@ class OperatorWindow(CosmicServerGui):
             self.add_panel(SCENE, self._scene, right, scroll=False)
         gui.undo_planned.connect(self._scene.set_planned)
         gui.ask_while(self._what_runs)
+        gui.refuse_while(self._what_drives)
+        gui.busy_refused.connect(self._on_busy_refused)
         self._parking = Parking(gui, self._is_moving, self)
         self._parking.failed.connect(lambda why: self.top_bar.set_message(f"not parked: {why}"))
         for asking in (self._closing, self._parking):
@@ -248,6 +251,8 @@ class OperatorWindow(CosmicServerGui):
         campaign = self._campaign
         if campaign is not None:
             self._tasks.campaigns = lambda: campaign.home
+            if self._tasks.operations is not None:
+                campaign.opened.connect(self._tasks.operations.close_card)
         self._tasks.add_coach(
             coach_rules(self, self._rig, self._mico_gui, self._tasks, self._campaign)
         )
@@ -399,6 +404,23 @@ class OperatorWindow(CosmicServerGui):
         """Return what moves axes by itself, as a reason not to move them under it."""
         running = self._rig.running
         return f"{running} is running and moves axes itself" if running else ""
+
+    def _what_drives(self) -> str:
+        """Return what moves axes just now, as a reason to move nothing by hand; any thread."""
+        operations = self._tasks.operations if self._tasks is not None else None
+        if operations is not None and operations.waits:  # a replay has the operator do something
+            return ""
+        driving = self._rig.driving
+        return f"{driving} moves the axes; end or pause it first" if driving else ""
+
+    def _on_busy_refused(self, why: str) -> None:
+        """Say why a key moved nothing where it is seen in every workspace, for a while."""
+        self.top_bar.set_message(why, State.REFUSED)
+        QTimer.singleShot(_SAID_MS, self, lambda: self._forget_message(why))
+
+    def _forget_message(self, text: str) -> None:
+        if self.top_bar.message == text:
+            self.top_bar.set_message("")
 
     def _is_moving(self) -> bool:
         """Tell whether Escape has something to stop."""

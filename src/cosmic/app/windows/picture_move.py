@@ -239,6 +239,8 @@ class PictureMove(QObject):
         try:
             motions = self._motions_along(ray)
             self._tool.say("")
+            if why := self._gui.busy:
+                raise NotAvailable(why)
             self._rig.mico.begin_together(dict(motions), source="click")
         except MoveRefused as exc:
             self._gui.verdict_given.emit(exc.verdict)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 from PySide6.QtCore import QObject, QSettings, QTimer
 from PySide6.QtWidgets import QStackedWidget, QWidget
 
+from cosmic.app.configuration.platform_file import platform_path
 from cosmic.app.panels.alarms import AlarmBook, AlarmPanel, Level
 from cosmic.app.panels.calibrations import CALIBRATIONS
 from cosmic.app.panels.campaign.dock import CAMPAIGN, campaigns_folder, can_run
@@ -241,10 +242,19 @@ class TaskLayout(QObject):
             return ProcedureRecorder(self._rig, operations.handling, lambda: operations.marked)
 
         tools = tuple(self.central_view.camera.camera.targets)
-        panel = RecorderPanel(watch, lambda: ("platform", "fibre", "plate", *tools), self.folder)
+        own = self._platform.path
+        panel = RecorderPanel(
+            watch,
+            lambda: ("platform", "fibre", "plate", *tools),
+            self.folder,
+            None if own == platform_path(None) else own.resolve(),
+        )
         panel.replay_requested.connect(lambda found: operations.replay(found, self.folder))
         panel.continued.connect(operations.go_on)
         operations.waiting.connect(panel.show_waiting)
+        panel.show_running(operations.title)
+        operations.began.connect(panel.show_running)
+        operations.ended.connect(lambda: panel.show_running(operations.title))
         operations.replay_wanted.connect(panel.request_replay)
         operations.offered = lambda: panel.procedure if panel.list.count() else None
         if self.force is not None:

@@ -25,10 +25,16 @@ def number(value: float, digits: int = 0) -> str:
 
 
 def with_interval(value: float, std: float, digits: int = 0) -> str:
-    """Return a number with half of its 95 % interval, as far as there are any."""
+    """Return a number with half of its 95 % interval, as far as there are any.
+
+    With up to three more digits where the interval would be read as none.
+    """
     if not (math.isfinite(value) and math.isfinite(std)):
         return number(value, digits)
-    return f"{number(value, digits)} ± {number(TWO_SIDED * std, digits)}"
+    half = TWO_SIDED * std
+    shown = (each for each in range(digits, digits + 4) if round(half, each))
+    digits = next(shown, digits)
+    return f"{number(value, digits)} ± {number(half, digits)}"
 
 
 def scale_words(scale: ForceScale | None) -> str:

@@ -9,7 +9,7 @@ from typing import Final, Protocol
 from typing_extensions import override
 
 from cosmic.autonomy.calibrating.registry import CalibrationRegistry
-from cosmic.autonomy.coordinate_transform import PlatformTransform
+from cosmic.autonomy.coordinate_transform import NO_TABLE, PlatformTransform
 from cosmic.autonomy.handling.force import ForceWatch
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Jaws, PlateFrame
@@ -319,8 +319,11 @@ class HandlingContext:
 
     @property
     def table(self) -> str:
-        """Name of the axis that turns the plate."""
-        return self.vision.settings.table_axis
+        """Name of the axis that turns the plate; raises `NotAvailable` where none is named."""
+        axis = self.vision.settings.table_axis
+        if not axis:
+            raise NotAvailable(NO_TABLE)
+        return axis
 
     @property
     def table_deg(self) -> float:

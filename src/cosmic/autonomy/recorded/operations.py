@@ -107,6 +107,16 @@ class Surroundings:
     going_on: OperatorSignal = field(default_factory=OperatorSignal)
     recording: Path | None = None
 
+    def ask(self, confirm: Callable[[str], bool]) -> None:
+        """Have steps that wait for the operator ask `confirm`; raises `OperationFailed` at no."""
+
+        def asks(words: str) -> None:
+            if words and not confirm(words):
+                raise OperationFailed("ended", f"{words}: it was not to go on")
+            self.going_on.give()
+
+        self.asks = asks
+
     def end_recording(self, daqco: Daqco) -> None:
         """End the recording that the replay began, where it still runs."""
         state = daqco.recording
@@ -270,9 +280,10 @@ class WaitingForOperator(_OneStep):
     @override
     def steps(self, work: HandlingContext) -> Steps:
         around = self._around
-        around.asks(self._step.words)
+        signal = around.going_on.again()  # before it is asked: the answer may be there at once
         try:
-            yield around.going_on.again()
+            around.asks(self._step.words)
+            yield signal
         finally:
             around.asks("")
         yield SAFE_POINT

@@ -18,6 +18,16 @@ FIBRE: Final = "fibre"
 PLATE: Final = "plate"
 FRAMES: Final = (PLATFORM, FIBRE, PLATE)
 """What a point may be relative to, beside the tip of a tool, which is given by its name."""
+NUMBERS: Final = {
+    "opening_um": "opening, µm",
+    "zoom": "zoom",
+    "focus_counts": "focus, counts",
+    "percent": "light, %",
+    "force_un": "force, µN",
+    "timeout_s": "longest wait, s",
+    "seconds": "time, s",
+}
+"""Keys of steps that are single numbers, and how they are read."""
 
 
 class RecordedStep(StrictModel):
@@ -42,6 +52,18 @@ class RecordedStep(StrictModel):
     def words(self) -> str:
         """The step in one line."""
         raise NotImplementedError
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Its single numbers, by key: they can be edited and asked for."""
+        found = self.model_dump(exclude_none=True)
+        return {key: float(found[key]) for key in NUMBERS if key in found}
+
+    @property
+    def table(self) -> dict[str, object]:
+        """It as a person reads it in a file: without what says nothing."""
+        found = self.model_dump(mode="json", exclude_none=True)
+        return {key: value for key, value in found.items() if value not in ("", {})}
 
 
 class MoveStep(RecordedStep):
@@ -77,6 +99,13 @@ class MoveStep(RecordedStep):
             parts.append(f"{self.tool} to {x:.0f}, {y:.0f}, {z:.0f} µm{beside}")
         parts += [f"{name} to {value:.1f}" for name, value in self.axes.items()]
         return f"Move {', '.join(parts)}"
+
+    @property
+    @override
+    def table(self) -> dict[str, object]:
+        """It as a person reads it in a file: without what says nothing."""
+        pointless = () if self.tool else ("point_um", "relative_to")
+        return {key: value for key, value in super().table.items() if key not in pointless}
 
 
 class GripperStep(RecordedStep):
@@ -190,6 +219,20 @@ class OperationStep(RecordedStep):
         """The step in one line."""
         return OperationRequest(self.operation, self.gripper, self.force_un).title
 
+    @property
+    @override
+    def numbers(self) -> dict[str, float]:
+        """Its single numbers, by key: they can be edited and asked for."""
+        return super().numbers if self.operation is SingleOperation.PUSH else {}
+
+    @property
+    @override
+    def table(self) -> dict[str, object]:
+        """It as a person reads it in a file: without what says nothing."""
+        kept = {**self.numbers, **self.ask}
+        found = super().table
+        return {key: value for key, value in found.items() if key != "force_un" or key in kept}
+
 
 Step = Annotated[
     MoveStep
@@ -224,7 +267,7 @@ class RecordedProcedure(StrictModel):
         """Return it with other values for what is asked; raises `ConfigError`."""
         steps = [each.model_dump(mode="json") for each in self.step]
         for (number, key), value in values.items():
-            steps[number][key] = value
+            steps[number][key] = int(value) if value.is_integer() else value  # counts are whole
         return _checked({"name": self.name, "step": steps}, self.name)
 
     @property
@@ -236,13 +279,26 @@ class RecordedProcedure(StrictModel):
             for each in self.step
         )
 
+    @property
+    def waits(self) -> str:
+        """The first step that waits for the operator, in words; empty where none does."""
+        waiting = (each.words for each in self.step if isinstance(each, WaitForOperatorStep))
+        return next(waiting, "")
+
     def save(self, path: Path) -> None:
         """Write it as a readable file; raises `OSError`."""
-        write_whole(path, tomlkit.dumps(self.model_dump(mode="json", exclude_none=True)))
+        steps = [each.table for each in self.step]
+        write_whole(path, tomlkit.dumps({"name": self.name, "step": steps}))
 
-    def save_python(self, path: Path) -> None:
-        """Write it as a script that replays it; raises `OSError`."""
-        write_whole(path, python_of(self))
+    def save_python(self, path: Path, config: Path | None = None) -> None:
+        """Write it as a script that replays it; raises `OSError`.
+
+        Parameters
+        ----------
+        config : Path or None
+            The platform file that it is replayed on; None: the simulated platform.
+        """
+        write_whole(path, python_of(self, config))
 
 
 def load_recorded(path: Path) -> RecordedProcedure:
@@ -273,8 +329,8 @@ def _checked(data: dict[str, object], where: str) -> RecordedProcedure:
 
 _SCRIPT: Final = '''"""{title}: recorded with CoSMic.
 
-python THIS_FILE replays it on the platform. A procedure that begins with a fibre takes the first
-that is certain.
+python THIS_FILE replays it on the platform that is named below. A procedure that begins with a
+fibre takes the first that is certain.
 """
 
 import cosmic
@@ -291,10 +347,10 @@ PROCEDURE = RecordedProcedure(
 )
 
 
-def main() -> None:
+{asking}def main() -> None:
     """Replay it."""
-    with cosmic.connect() as rig:
-        rig.replay(PROCEDURE).run_here()
+    with cosmic.connect({config}) as rig:
+        rig.replay(PROCEDURE{confirm}).run_here()
 
 
 if __name__ == "__main__":
@@ -302,8 +358,16 @@ if __name__ == "__main__":
 '''
 
 
-def python_of(procedure: RecordedProcedure) -> str:
-    """Return a script that replays a procedure."""
+_ASKING: Final = '''def ask(words: str) -> bool:
+    """Wait for the operator."""
+    return not input(f"{words}. Enter goes on, any other answer ends it: ")
+
+
+'''
+
+
+def python_of(procedure: RecordedProcedure, config: Path | None = None) -> str:
+    """Return a script that replays a procedure on the platform of a file."""
     kinds = sorted({type(each).__name__ for each in procedure.step})
     lines = []
     for each in procedure.step:
@@ -322,6 +386,9 @@ def python_of(procedure: RecordedProcedure) -> str:
         imports="\n".join(f"    {kind}," for kind in kinds),
         further=more,
         steps="\n".join(lines),
+        asking=_ASKING if procedure.waits else "",
+        confirm=", confirm=ask" if procedure.waits else "",
+        config="" if config is None else repr(str(config)),
     )
 
 

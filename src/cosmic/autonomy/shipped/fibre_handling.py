@@ -8,6 +8,7 @@ from typing import Final, Protocol, get_args
 
 from typing_extensions import override
 
+from cosmic.autonomy.coordinate_transform import NO_TABLE
 from cosmic.autonomy.handling.context import Applications, HandlingContext, vision_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.marked import MarkedFibre, approach_to
@@ -235,6 +236,8 @@ class FibreHandling:
             return f"{doubt}; put it away first"
         if self.fibre is not None:
             return f"{self._state.gripper} holds a fibre; put it away first"
+        if not self._rig.vico.application.settings.table_axis:
+            return NO_TABLE
         return self._why_no_gripper(request) or self._why_not_at_zoom(request, request.marked)
 
     def _doubt(self) -> str:

@@ -232,11 +232,16 @@ class Daqco(Declared):
         Raises
         ------
         NotAvailable
-            Nothing has been acquired yet.
+            Nothing has been acquired yet, or nothing is any more; `latest_chunk` has what was.
         """
         chunk = self.latest_chunk
         if chunk is None:
             raise NotAvailable(self.problem or "nothing has been acquired yet")
+        if not self.running:
+            age_s = self._application.clock.now_s() - chunk.end_time_s
+            raise NotAvailable(
+                f"{self.problem or 'acquisition is stopped'}; the newest value is {age_s:.1f} s old"
+            )
         return chunk.newest()
 
     @stream(Rule.ALL, topic="chunks", missing=missing_samples)

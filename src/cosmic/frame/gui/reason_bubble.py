@@ -86,6 +86,8 @@ class ReasonBubble(QLabel):
         y = top_left.y() + field.height() + STEP_PX // 2
         if y + self.height() > window.height():
             y = top_left.y() - self.height() - STEP_PX // 2
+        if y < 0:  # a short dialog: over what is below the field, rather than cut off
+            y = max(0, window.height() - self.height())
         self.move(x, y)
         self.setVisible(not field.visibleRegion().isEmpty())
         self.raise_()

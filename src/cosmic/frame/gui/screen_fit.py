@@ -26,19 +26,34 @@ def room_for(window: QWidget) -> QRect | None:
 
 def fit_to_screen(window: QWidget) -> None:
     """Make a window no larger than the room on its screen, and put it inside; GUI thread."""
-    room = room_for(window)
+    room = _room_within_frame(window)
     if room is None or not window.isWindow() or window.isMaximized() or window.isFullScreen():
         return
-    inner, outer = window.geometry(), window.frameGeometry()
-    framed = outer != inner
-    left, top = (inner.x() - outer.x(), inner.y() - outer.y()) if framed else (0, FRAME_PX)
-    right, bottom = outer.right() - inner.right(), outer.bottom() - inner.bottom()
-    room = room.adjusted(left, top, -right, -bottom)
+    inner = window.geometry()
     wanted = QRect(inner.topLeft(), inner.size().boundedTo(room.size()))
     wanted.moveLeft(max(room.left(), min(wanted.left(), room.right() + 1 - wanted.width())))
     wanted.moveTop(max(room.top(), min(wanted.top(), room.bottom() + 1 - wanted.height())))
     if wanted != inner:
         window.setGeometry(wanted)
+
+
+def limit_to_least(window: QWidget, least: QSize) -> None:
+    """Let a window be made no smaller than that, or than its screen where that is smaller."""
+    room = _room_within_frame(window)
+    if room is not None:
+        window.setMinimumSize(least.boundedTo(room.size()))
+
+
+def _room_within_frame(window: QWidget) -> QRect | None:
+    """Return what a window may cover inside its frame; None offscreen."""
+    room = room_for(window)
+    if room is None:
+        return None
+    inner, outer = window.geometry(), window.frameGeometry()
+    framed = outer != inner
+    left, top = (inner.x() - outer.x(), inner.y() - outer.y()) if framed else (0, FRAME_PX)
+    right, bottom = outer.right() - inner.right(), outer.bottom() - inner.bottom()
+    return room.adjusted(left, top, -right, -bottom)
 
 
 class DialogFitter(QObject):

@@ -4,8 +4,16 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
-from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
-from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QKeySequence, QResizeEvent, QShowEvent
+from PySide6.QtCore import QObject, QSettings, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import (
+    QAction,
+    QActionGroup,
+    QCloseEvent,
+    QGuiApplication,
+    QKeySequence,
+    QResizeEvent,
+    QShowEvent,
+)
 from PySide6.QtWidgets import (
     QApplication,
     QDockWidget,
@@ -24,7 +32,7 @@ from cosmic.frame.gui.drawer import Drawer
 from cosmic.frame.gui.keys_dialog import KeyList, KeysDialog
 from cosmic.frame.gui.layout_store import LayoutStore
 from cosmic.frame.gui.palette import ThemeName
-from cosmic.frame.gui.screen_fit import DialogFitter, fit_to_screen
+from cosmic.frame.gui.screen_fit import DialogFitter, fit_to_screen, limit_to_least
 from cosmic.frame.gui.tab_bars import hide_stale_tab_bars
 from cosmic.frame.gui.theme import STEP_PX, apply_theme, current_palette
 from cosmic.frame.gui.top_bar import TopBar
@@ -32,6 +40,8 @@ from cosmic.frame.gui.wheel_guard import WheelGuard
 from cosmic.frame.gui.workspaces import Workspace, Workspaces
 from cosmic.frame.overrides import override
 
+LEAST_SIZE: Final = QSize(1024, 600)
+"""What the workspaces fit into; buttons lie over each other in less."""
 _THEMES: Final = {"dark": "Dark", "light": "Light"}
 
 
@@ -445,11 +455,15 @@ class CosmicServerGui(QMainWindow):
         hide_stale_tab_bars(self)
         self._fit()  # now that the desktop has put its frame round it
         self.windowHandle().screenChanged.connect(self._on_screen_changed)
+        for screen in QGuiApplication.screens():
+            screen.availableGeometryChanged.connect(self._on_screen_changed)
 
     def _on_screen_changed(self) -> None:
         QTimer.singleShot(0, self, self._fit)  # Qt places it there first
 
     def _fit(self) -> None:
+        if self._workspaces is not None:
+            limit_to_least(self, LEAST_SIZE)
         fit_to_screen(self)
 
     @override

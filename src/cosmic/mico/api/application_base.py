@@ -1,7 +1,7 @@
 """What scripts and windows use of MiCo, whether it runs in this process or at a station."""
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from threading import Lock
 from typing import Final
@@ -37,6 +37,11 @@ class MicoApplicationBase(TaskApplication):
         The initialisation sequence is further; in the application's thread.
     status_changed()
         Devices came or went, or MiCo failed.
+
+    Attributes
+    ----------
+    busy : callable
+        Returns why an input device steers nothing now, in words; empty where it may.
     """
 
     rescanned = Signal()
@@ -59,6 +64,7 @@ class MicoApplicationBase(TaskApplication):
         self._folder = folder
         self._steering = Lock()
         self._teleoperation: Teleoperation | None = None
+        self.busy: Callable[[], str] = str
 
     def teleoperation_of(self, platform: SteeredPlatform) -> Teleoperation:
         """Return what steers the axes by an input device plugged in here; any thread.
@@ -72,6 +78,7 @@ class MicoApplicationBase(TaskApplication):
                 if made is not None:
                     made.close()
                 made = Teleoperation(platform, self._policy, folder=self._folder)
+                made.busy = lambda: self.busy()
                 self._teleoperation = made
                 if self.end_requested:
                     made.close()

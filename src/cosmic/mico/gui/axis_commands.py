@@ -66,6 +66,8 @@ class AxisCommands(QObject):
         The gate's own words to a refusal, also of a jog that stops in front of something.
     refusal_over()
         What was refused before holds no longer: the axis has moved since, or the stop was reset.
+    busy_refused(str)
+        It was refused as something else moves the axes; with what.
     ended(str)
         It ended; the text says why, and is empty at its target.
     consent_wanted(ConsentRequest)
@@ -80,6 +82,7 @@ class AxisCommands(QObject):
     refused = Signal(object, str)
     verdict_given = Signal(object)
     refusal_over = Signal()
+    busy_refused = Signal(str)
     ended = Signal(str)
     consent_wanted = Signal(object)
     detour_wanted = Signal(object)
@@ -95,6 +98,8 @@ class AxisCommands(QObject):
         self._rested_at: float | None = None
         self._refused_wall_s = 0.0
         self._blocked: _Command | None = None
+        self.busy: Callable[[], str] = str
+        """Returns why the operator moves nothing now; empty where nothing speaks against it."""
         self.plans_detours = False
         """Have a detour planned where something stands in the way of a move to a goal.
 
@@ -138,6 +143,8 @@ class AxisCommands(QObject):
         self._issue(command)
 
     def _issue(self, command: _Command) -> None:
+        if self.refuse_busy(command.field):
+            return
         self.abandon_series()
         self._newest = self._blocked = None
         self._moved = False
@@ -152,6 +159,14 @@ class AxisCommands(QObject):
         self._newest = replace(command, movement=movement)
         self.begun.emit()
         movement.add_callback(self._relay)
+
+    def refuse_busy(self, field: QWidget | None = None) -> bool:
+        """Refuse what is wanted while something else moves the axes; tells whether it did."""
+        why = self.busy()
+        if why:
+            self.refused.emit(field, why)
+            self.busy_refused.emit(why)
+        return bool(why)
 
     def abandon_series(self) -> None:
         """Let a series begin no further part: something newer is about to come."""

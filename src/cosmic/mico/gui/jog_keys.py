@@ -75,6 +75,8 @@ class JogKeys(QObject):
     def _on_hold_started(self, key: str) -> None:
         jog = self._keys[key]
         axis, commands = jog.card.axis, jog.card.commands
+        if commands.refuse_busy():
+            return
         commands.abandon_series()
         self._lost.pop(key, None)
         try:
@@ -109,8 +111,13 @@ class JogKeys(QObject):
             self._timer.stop()
 
     def _on_timer(self) -> None:
-        for running in self._running.values():
-            if not running.done:
+        for key, running in self._running.items():
+            if running.done:
+                continue
+            if why := self._keys[key].card.commands.busy():  # it has begun under the held key
+                self._lost[key] = why
+                running.end(why)
+            else:
                 running.renew()
 
 

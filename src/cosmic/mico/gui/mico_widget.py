@@ -88,6 +88,8 @@ class MicoWidget(QWidget):
         There may be other devices now.
     verdict_given(MoveVerdict)
         A command of this panel was refused, or a jog stopped in front of something.
+    busy_refused(str)
+        A command of this panel was refused as something else moves the axes; with what.
     refusal_over(str)
         What was refused for that axis holds no longer: it has moved since.
     undo_planned(object)
@@ -100,6 +102,7 @@ class MicoWidget(QWidget):
     failure_changed = Signal(str)
     refreshed = Signal()
     verdict_given = Signal(object)
+    busy_refused = Signal(str)
     refusal_over = Signal(str)
     undo_planned = Signal(object)
     detour_wanted = Signal(object)
@@ -114,6 +117,7 @@ class MicoWidget(QWidget):
         self._dialog: ConsentDialog | None = None
         self._caution: CautionDialog | None = None
         self._plans_detours = False
+        self._busy: Callable[[], str] = str
         self._stopped: str | None = None
         self._collision = CollisionStatus(mico)
         self._outline: tuple[object, ...] = ()
@@ -225,6 +229,17 @@ class MicoWidget(QWidget):
         """Have Undo and Initialise ask first, too, while `doubt` returns a reason."""
         self._undoing.doubt = self._steps.doubt = doubt
 
+    def refuse_while(self, busy: Callable[[], str]) -> None:
+        """Have keys, buttons, fields and input devices move nothing while `busy` says why."""
+        self._busy = self._application.busy = busy
+        for card in self._cards.values():
+            card.commands.busy = busy
+
+    @property
+    def busy(self) -> str:
+        """Why the operator moves nothing now; empty where nothing speaks against it."""
+        return self._busy()
+
     @property
     def undoing(self) -> UndoGui:
         """What takes the last movement back."""
@@ -309,6 +324,8 @@ class MicoWidget(QWidget):
             card.commands.refusal_over.connect(partial(self.refusal_over.emit, name))
             card.commands.detour_wanted.connect(self.detour_wanted)
             card.commands.plans_detours = self._plans_detours
+            card.commands.busy = self._busy
+            card.commands.busy_refused.connect(self.busy_refused)
             card.show_stopped(self._stopped)
             if isinstance(card, ClosedLoopGUI):
                 join_links(card, self._mico)

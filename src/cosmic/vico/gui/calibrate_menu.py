@@ -81,12 +81,23 @@ class CalibrateButton(QToolButton):
 
     def lines(self) -> list[str]:
         """Return what is calibrated, a line each."""
-        return [
+        lines = [
             f"{each.tool}: {each.scale_um_px:.4g} µm a pixel at zoom {each.zoom_counts:.0f}, "
             f"height {each.height_um:.0f} µm; {each.residual_px:.2f} px off, "
-            f"{duration_text((self._now() - each.measured).total_seconds())} old"
+            f"{self._age(each.measured)}"
             for each in self._camera.calibrated
         ]
+        turns = self._camera.rotation
+        if turns is not None:
+            x_um, y_um = turns.centre_um
+            lines.append(
+                f"rotation centre: x {x_um:.1f}, y {y_um:.1f} µm, known to {turns.std_um:.1f} µm; "
+                f"{self._age(turns.measured)}"
+            )
+        return lines
+
+    def _age(self, measured: datetime) -> str:
+        return f"{duration_text((self._now() - measured).total_seconds())} old"
 
     def _begin_stage(self, tool: str) -> None:
         self._begin(lambda: self._camera.calibrate_stage(tool))

@@ -352,6 +352,8 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
         if self.tool is not None and event.button() == Qt.MouseButton.LeftButton:
             self.setFocus(Qt.FocusReason.MouseFocusReason)
             self._with_tool(self.tool.press, event)
+        elif event.button() == Qt.MouseButton.RightButton:
+            event.accept()  # its menu swallows the release: pyqtgraph took the next drag for its
         else:
             super().mousePressEvent(event)
 
@@ -361,14 +363,14 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
         self.pointed.emit(here if self.is_inside(here) else None)
         if self.tool is not None:
             self._with_tool(self.tool.move, event)
-        else:
+        elif not event.buttons() & Qt.MouseButton.RightButton:
             super().mouseMoveEvent(event)
 
     @override
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if self.tool is not None and event.button() == Qt.MouseButton.LeftButton:
             self._with_tool(self.tool.release, event)
-        else:
+        elif event.button() != Qt.MouseButton.RightButton:
             super().mouseReleaseEvent(event)
 
     @override

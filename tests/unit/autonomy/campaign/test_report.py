@@ -12,7 +12,7 @@ import pytest
 
 from cosmic.app.cli import main
 from cosmic.autonomy.bending.result import Contribution, Kind
-from cosmic.autonomy.campaign.formatting import budget_rows, length_words
+from cosmic.autonomy.campaign.formatting import budget_rows, length_words, with_interval
 from cosmic.autonomy.campaign.records import (
     CERTAIN,
     CalibrationNote,
@@ -307,3 +307,16 @@ def test_the_spans_are_drawn_as_they_were_read_and_as_the_fit_has_them() -> None
     older = tuple(replace(each, off_model_log=math.nan) for each in spans)
     kept = replace(record, bending=replace(record.bending, spans=older))
     assert circles(stiffness_figure(kept)) == [False] * len(spans)
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "text"),
+    [
+        (1.66, 0.0012, "1.660 ± 0.002"),
+        (1.66, 0.3, "1.66 ± 0.59"),
+        (1.66, 0.0, "1.66 ± 0.00"),
+        (1.66, math.nan, "1.66"),
+    ],
+)
+def test_an_interval_is_not_rounded_to_none(value: float, std: float, text: str) -> None:
+    assert with_interval(value, std, 2) == text

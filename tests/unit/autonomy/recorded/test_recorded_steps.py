@@ -2,6 +2,7 @@
 
 import runpy
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
@@ -49,6 +50,48 @@ def test_what_is_saved_is_read_again_and_can_be_read_by_a_person(tmp_path: Path)
     assert 'relative_to = "fibre"' in text
 
 
+def test_the_file_says_nothing_that_means_nothing(tmp_path: Path) -> None:
+    steps = [
+        OperationStep(operation=SingleOperation.TAKE, gripper="left"),
+        OperationStep(operation=SingleOperation.PUSH),
+        MoveStep(axes={"left.x": 5.0}),
+    ]
+    file = tmp_path / "short.toml"
+    RecordedProcedure(name="short", step=steps).save(file)
+    assert file.read_text("utf-8").split("\n") == [
+        'name = "short"',
+        "",
+        "[[step]]",
+        'kind = "operation"',
+        'operation = "take"',
+        'gripper = "left"',
+        "",
+        "[[step]]",
+        'kind = "operation"',
+        'operation = "push"',
+        "force_un = 50.0",
+        "",
+        "[[step]]",
+        'kind = "move"',
+        "",
+        "[step.axes]",
+        '"left.x" = 5.0',
+        "",
+    ]
+
+
+def test_numbers_are_those_that_an_operation_uses_and_counts_stay_whole() -> None:
+    assert not OperationStep(operation=SingleOperation.TAKE, gripper="left").numbers
+    assert OperationStep(operation=SingleOperation.PUSH).numbers == {"force_un": 50.0}
+    lens = LensStep(focus_counts=4000, ask={"focus_counts": "Focus"})
+    procedure = RecordedProcedure(name="focus", step=[lens])
+    assert procedure.with_values({(0, "focus_counts"): 3900.0}).step[0].words == (
+        "Lens: focus 3900 counts"
+    )
+    with pytest.raises(ConfigError, match="focus_counts"):
+        procedure.with_values({(0, "focus_counts"): 3900.5})
+
+
 def test_the_script_holds_the_same_procedure_and_begins_nothing_when_imported(
     tmp_path: Path,
 ) -> None:
@@ -57,6 +100,24 @@ def test_the_script_holds_the_same_procedure_and_begins_nothing_when_imported(
     names = runpy.run_path(str(file))
     assert names["PROCEDURE"] == EVERYTHING
     assert "# Push to 50 µN" in file.read_text("utf-8")
+
+
+def test_the_script_asks_the_operator_and_names_the_platform(tmp_path: Path) -> None:
+    file, config = tmp_path / "wait.py", tmp_path / "lab" / "platform.toml"
+    procedure = RecordedProcedure(name="wait", step=[WaitForOperatorStep(text="look")])
+    procedure.save_python(file, config)
+    names = runpy.run_path(str(file))
+    with patch("builtins.input", side_effect=["", "no"]) as asked:
+        assert names["ask"]("Wait for key: look")
+        assert not names["ask"]("Wait for key: look")
+    assert "Wait for key: look" in asked.call_args.args[0]
+    text = file.read_text("utf-8")
+    assert f"cosmic.connect({str(config)!r})" in text
+    assert "confirm=ask" in text
+    RecordedProcedure(name="bright", step=[LightStep(percent=40.0)]).save_python(file)
+    text = file.read_text("utf-8")
+    assert "cosmic.connect()" in text
+    assert "rig.replay(PROCEDURE).run_here()" in text
 
 
 @pytest.mark.parametrize("name", ["C:\\new\\users", 'the """best"""', "two\nlines", '"µ"', "end\\"])

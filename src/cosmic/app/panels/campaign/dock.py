@@ -49,9 +49,12 @@ class CampaignDock(QObject):
     -------
     replayed()
         The scene shows movements of before from now on.
+    opened()
+        A campaign is about to begin, or to go on.
     """
 
     replayed = Signal()
+    opened = Signal()
 
     def __init__(
         self,
@@ -85,6 +88,7 @@ class CampaignDock(QObject):
         panel = CampaignPanel(self._rig.campaign, campaigns_folder(), self._policy)
         self._replay = SceneReplay(self._scene, self)
         panel.replay_requested.connect(self._on_replay)
+        panel.opened.connect(self.opened)
         return panel
 
     @property

@@ -141,9 +141,12 @@ class CampaignPanel(QWidget):
     -------
     replay_requested(FibreRecord)
         The operator wants to see the movements of a fibre.
+    opened()
+        A campaign is about to begin, or to go on.
     """
 
     replay_requested = Signal(object)
+    opened = Signal()
 
     def __init__(
         self,
@@ -283,6 +286,7 @@ class CampaignPanel(QWidget):
         self.folder.setText(str(folder))
         self._say("")
         self.refresh()
+        self.opened.emit()
         return CampaignRun(campaign)
 
     def _on_changed(self) -> None:

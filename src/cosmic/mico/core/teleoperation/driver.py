@@ -2,6 +2,7 @@
 
 import logging
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import Final, Protocol
 
 from cosmic.frame.clock import WALL
@@ -72,6 +73,7 @@ class AxisDriver:
         *,
         source: str,
         commands: RateMeter,
+        busy: Callable[[], str] = str,
     ) -> None:
         state = axis.details
         self.name = axis.key
@@ -80,6 +82,7 @@ class AxisDriver:
         self._source = source
         self._sensor = class_for(state.kind, state.positioner).has_sensor
         self._commands = commands
+        self._busy = busy
         self._steered: Steered | None = None
         self._sent = 0.0
         self._sent_wall_s = self._began_wall_s = 0.0
@@ -101,6 +104,10 @@ class AxisDriver:
         if self._steered is not None and self._steered.movement.done:
             self._look_why(self._steered.movement)
         if direction == self._blocked:
+            return
+        if why := self._busy():
+            self.release(why)
+            self._block(velocity, why)
             return
         if self._blocked:
             self._blocked, self.refused = 0, ""

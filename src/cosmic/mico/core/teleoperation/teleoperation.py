@@ -74,6 +74,12 @@ class Teleoperation:
     """Starts and ends the steering by an input device; any thread.
 
     A stop, a lost device or a failed thread ends it, and it must be started again.
+
+    Attributes
+    ----------
+    busy : callable
+        Returns why nothing is steered now, such as an operation that moves the axes itself; empty
+        where nothing speaks against it. Asked in the thread that reads the device.
     """
 
     def __init__(
@@ -90,6 +96,7 @@ class Teleoperation:
             self.settings.inputs, self.settings.input, simulated=platform.simulated
         )
         self.coupling: ForceCoupling | None = None
+        self.busy: Callable[[], str] = str
         self._book = ProfileBook(self.settings, user_file(self.settings.profiles, folder))
         for text in self._book.misfits(platform.settings.kinds):
             logger.warning("%s: %s", self._book.path, text)
@@ -238,7 +245,13 @@ class Teleoperation:
         mapping, commands = self._mapping(profile), RateMeter()
         platform, coupling = self._platform, self.coupling
         drivers = {
-            name: AxisDriver(platform[name], self.settings, source=SOURCE, commands=commands)
+            name: AxisDriver(
+                platform[name],
+                self.settings,
+                source=SOURCE,
+                commands=commands,
+                busy=lambda: self.busy(),
+            )
             for name in mapping.positioners
         }
         return Steering(
