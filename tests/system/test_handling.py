@@ -142,6 +142,30 @@ def test_a_fibre_that_was_lost_on_the_path_is_found_and_measured_all_the_same(
 
 
 @pytest.mark.slow
+def test_jaws_follow_a_fibre_that_a_draught_moves_as_they_come_down(tmp_path: Path):
+    truth = tmp_path / "truth.jsonl"
+    blind = SETTINGS.model_copy(
+        update={"grasp": SETTINGS.grasp.model_copy(update={"follow_um": 0.0})}
+    )
+    with sample("three-dry", truth, seed=2) as bench:
+        carried_out(bench.work, build_transport(SETTINGS))
+        bench.rig.faults.inject("draught", amount=140.0)
+        followed = carried_out(bench.work, build_transport(SETTINGS))
+        bench.work.settings = blind
+        bench.rig.faults.inject("draught", amount=140.0)
+        with pytest.raises(OperationFailed):
+            carried_out(bench.work, build_transport(blind))
+    record = read_truth(truth)
+    assert followed.failure is None
+    blown = [each.facts["fibre"] for each in record.of("blown")]
+    grasped = [each.facts["fibre"] for each in record.of("grasped")]
+    assert len(blown) == 2
+    assert blown[0] in grasped[1:]
+    assert blown[1] not in grasped
+    assert unintended(record) == set()
+
+
+@pytest.mark.slow
 def test_a_fibre_is_only_carried_where_nothing_is_to_be_measured(tmp_path: Path):
     with sample("three-dry", tmp_path / "truth.jsonl", seed=5) as bench:
         fibre = carried_out(bench.work, build_transport(SETTINGS))

@@ -20,7 +20,7 @@ from cosmic.twin.kinematics import Point
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.surroundings import Record, Surroundings
 from cosmic.twin.tools import Tool
-from cosmic.twin.twin_faults import TwinFaults
+from cosmic.twin.twin_faults import DRAUGHT, TwinFaults
 
 
 class Clinging:
@@ -116,6 +116,13 @@ def between_jaws(
     return None
 
 
+DRAUGHT_UM: Final = 60.0
+DRAUGHT_FROM_UM: Final = 400.0
+DRAUGHT_TO_UM: Final = 80.0
+"""Heights of a gripper between which it blows a fibre aside."""
+BELOW_UM: Final = 200.0
+"""How far from the tip a fibre is below it."""
+
 CARRYING_UM: Final = 8.0
 """Way within which something may happen to a fibre that is lifted or will be lost."""
 
@@ -165,6 +172,7 @@ class GripperContacts:
         self._clinging: dict[int, Clinging] = {}
         self._widest: dict[str, float] = {}
         self._came_um: dict[int, tuple[Point, float]] = {}
+        self._blown: dict[str, tuple[Fibre | None, float]] = {}
         self._narrowest = min((each.settings.width_um for each in fibres), default=0.0)
         self._thickest = max((each.settings.width_um for each in fibres), default=0.0)
         self.gap_um = self.slack_um = 0.0
@@ -174,7 +182,12 @@ class GripperContacts:
     @property
     def idle(self) -> bool:
         """Whether nothing can happen as long as no jaws open or close."""
-        return self._settled and not (self._in_hand or self._clinging)
+        return self._settled and not (self._in_hand or self._clinging or self.windy)
+
+    @property
+    def windy(self) -> bool:
+        """Whether a fibre is blown aside when the next gripper comes down."""
+        return any(each.name == DRAUGHT for each in self._injected.active)
 
     def plate_changed(self, begin: int) -> None:
         """Take note that the fibres from number `begin` on lie on a new plate."""
@@ -189,7 +202,9 @@ class GripperContacts:
         if not self._begun:
             self._begun = True
             self._begin(around)
-        self.slack_um = CARRYING_UM if self._clinging else math.inf
+        self.slack_um = CARRYING_UM if self._clinging or self.windy else math.inf
+        if self.windy:
+            self._blow(around)
         self._watch_all(around)
         if self._in_hand:
             for name, fibre in list(self._in_hand.items()):
@@ -244,6 +259,47 @@ class GripperContacts:
                 fibre.on_plate = False
                 fibre.grip(tool, at_um=at, outwards=tool.towards, fate=fate)
                 self._in_hand[name] = fibre
+
+    # ------------------------------------------------------------------ coming down
+
+    def _blow(self, around: Surroundings) -> None:
+        """Have the fibre below a gripper that comes down go aside with it."""
+        plate = around.plate()
+        for name, tool in around.tools.items():
+            fault = self._injected.foreseen(DRAUGHT, name)
+            height = tool.hold[2] - float(plate[2, 3])
+            part = min((DRAUGHT_FROM_UM - height) / (DRAUGHT_FROM_UM - DRAUGHT_TO_UM), 1.0)
+            if fault is None or name in self._in_hand:
+                continue
+            if part <= 0.0:
+                self._blown.setdefault(name, (None, 0.0))
+            fibre, before = self._blown.get(name, (None, 1.0))  # one that is down comes from above
+            if part <= before:
+                continue
+            fibre = fibre or self._below(tool, around)
+            if fibre is None:
+                continue
+            amount = DRAUGHT_UM if fault.amount is None else fault.amount
+            x, y = (plate[:2, :2].T @ np.array([0.0, amount * (part - before)])).tolist()
+            x0, y0, angle = fibre.plate_pose
+            fibre.plate_pose = x0 + x, y0 + y, angle
+            self._blown[name] = fibre, part
+            if part >= 1.0:
+                del self._blown[name]
+                self._injected.take(DRAUGHT, name)
+                self._record("blown", fibre=fibre.number, tool=name, by_um=amount)
+
+    def _below(self, tool: Tool, around: Surroundings) -> Fibre | None:
+        """Return the lying fibre that is nearest to a gripper's tip, across its jaws."""
+        x, y, _ = tool.hold
+        near: list[tuple[float, Fibre]] = []
+        for each in self.fibres:
+            line = self.world_um(each, around)
+            line = line[np.argsort(line[:, 0])]
+            if each.lies and line[0, 0] <= x <= line[-1, 0]:
+                near.append((abs(float(np.interp(x, line[:, 0], line[:, 1])) - y), each))
+        away, fibre = min(near, key=lambda pair: pair[0], default=(math.inf, None))
+        return fibre if away <= BELOW_UM else None
 
     # ------------------------------------------------------------------ closing
 

@@ -11,6 +11,7 @@ from cosmic.frame.errors import ArgumentError
 from cosmic.twin.fate import Fate
 from cosmic.twin.handling_settings import HandlingSettings
 
+DRAUGHT: Final = "draught"
 GRASP_NAMES: Final = (
     "missed_grasp",
     "slip_in_lift",
@@ -19,6 +20,7 @@ GRASP_NAMES: Final = (
     "fibre_break",
     "loose_grip",
     "out_of_plane",
+    DRAUGHT,
 )
 """They come true at the next grasps, as many as asked for."""
 
@@ -64,6 +66,8 @@ class TwinFaults:
     - `missed_grasp`, `slip_in_lift`, `drop`, `jaw_adhesion`, `fibre_break`, `loose_grip`,
       `out_of_plane`: spoil the next `times` grasps, of one gripper or of any, as `[handling]` has
       it. What they need comes later: a fibre breaks when it is bent.
+    - `draught`: as a gripper comes down, at the next `times`, the fibre below it is blown `amount`
+      (60) um aside, across the jaws.
     - `tip_bent`: the tip of "left", "right" or "probe" is `amount` (30) um off, along the jaws for
       a gripper, sideways for the probe, until cleared.
     - `light_dimmed`: the lamp gives only a part, `amount` (0.3), of its light.
@@ -131,6 +135,11 @@ class TwinFaults:
         for fault in ended:
             if self.begin is not None and fault.name in LASTING_NAMES:
                 self.begin(fault, False)
+
+    def foreseen(self, name: str, tool: str) -> TwinFault | None:
+        """Return what the next grasp of `tool` is spoilt by, without counting it."""
+        fitting = (each for each in self._active if each.name == name)
+        return next((each for each in fitting if each.tool in ("", tool)), None)
 
     def take(self, name: str, tool: str) -> bool:
         """Return whether a grasp of `tool` is spoilt so, and count it."""

@@ -189,6 +189,8 @@ class Workspace:
         clear, drift_um_s = self._clear, self.offsets.fastest_um_s
         if self._contacts is None or clear.left_um <= 0.0 or drift_um_s is None:
             return None
+        if self._gripper_contacts.windy:
+            return None
         for name, stage in self._jaw_stages:
             if values[stage] != self._gaps[name]:
                 return None

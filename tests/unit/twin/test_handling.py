@@ -97,6 +97,22 @@ def test_a_curled_fibre_is_taken_where_it_is_drawn(angle_deg: float) -> None:
     assert beside.open().where() == "plate"
 
 
+def test_a_draught_blows_the_fibre_aside_that_a_gripper_comes_down_to_and_once() -> None:
+    hand = Hand()
+    calm = hand.fibre().line_um[:, 1].mean()
+    hand.lift()
+    hand.bench.scene.faults.inject("draught", amount=140.0)
+    assert hand.fibre().line_um[:, 1].mean() == pytest.approx(calm)
+    hand.lift(200.0)
+    half_way = hand.fibre().line_um[:, 1].mean() - calm
+    assert 30.0 < half_way < 139.0
+    hand.lift(0.0)
+    assert hand.fibre().line_um[:, 1].mean() == pytest.approx(calm + 140.0, abs=0.1)
+    hand.lift().lift(0.0)
+    assert hand.fibre().line_um[:, 1].mean() == pytest.approx(calm + 140.0, abs=0.1)
+    assert [facts["by_um"] for name, facts in hand.heard.events if name == "blown"] == [140.0]
+
+
 def test_jaws_do_not_close_on_a_fibre_that_runs_out_under_one_of_them() -> None:
     assert Hand(x_um=-700.0, angle_deg=25.0).close().where() == "plate"
     assert Hand(x_um=200.0, y_um=200.0, angle_deg=25.0).close().where() == "held"

@@ -1,13 +1,16 @@
 """Operations that bring a fibre and the gripper together."""
 
+import logging
 from typing import Final
 
 import numpy as np
 from typing_extensions import override
 
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
+from cosmic.autonomy.handling.guided_move import AimLimits, GuidedMove
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.jaws import move_jaws, note_closed, note_gap
+from cosmic.autonomy.handling.lying_fibre import LyingFibre
 from cosmic.autonomy.handling.plate import along, arc_lengths
 from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen, trace_along
 from cosmic.autonomy.handling.tips import see_tip
@@ -15,6 +18,8 @@ from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, St
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats
 from cosmic.vico.core.vision.tool_types import GripperTips
+
+logger = logging.getLogger(__name__)
 
 LOST = "lost"
 TIP_NOT_SEEN = "tip not seen"
@@ -140,12 +145,55 @@ class Approach(FibreOperation):
         x, y = along(line_of(fibre), fibre.inside_um).tolist()
         yield work.go(work.at(work.gripper, x, y))
         with work.mico.collision.contact("grasp"):
-            yield work.go_up(work.grasp_um)
+            if work.settings.grasp.follow_um > 0.0:
+                yield from _follow_down(work, fibre, y)
+            else:
+                yield work.go_up(work.grasp_um)
 
     @override
     def undo(self, work: HandlingContext) -> Steps:
         with work.mico.collision.contact("grasp"):
             yield work.go_up(work.settings.places.travel_um)
+
+
+def _follow_down(work: HandlingContext, fibre: HeldFibre, y_um: float) -> Steps:
+    """Come down around the fibre, and go along with it where it shifts.
+
+    The jaws wait above it until it is between them: none is set down on it.
+    """
+    grasp, gripper = work.settings.grasp, work.gripper
+    lying = LyingFibre(work, fibre, line_of(fibre))
+    axis = work.mico[gripper.z_axis]
+    most = grasp.follow_most_um
+    axis.set_closed_loop_frequency(min(grasp.descend_hz, work.settings.frequency_hz))
+    try:
+        for height in (max(grasp.hover_um, work.grasp_um), work.grasp_um):
+            _, now_um = work.tip_now(gripper)
+            yield GuidedMove(
+                work.go_up(height),
+                camera=work.vico.camera(work.settings.camera),
+                clock=work.clock,
+                look=lying.aim,
+                correct=lambda to_um: work.go({gripper.y_axis: to_um - gripper.tip_um[1]}),
+                target_um=now_um,
+                limits=AimLimits(grasp.close_enough_um, most),
+            )
+            # What it has gone along with counts for all of the way down.
+            gone = abs(work.tip_now(gripper)[1] - y_um)
+            most = max(grasp.follow_most_um - gone, 0.0)
+    except OperationFailed:
+        fibre.tries += 1  # it is looked for with the gripper out of the way
+        raise
+    finally:
+        axis.set_closed_loop_frequency(work.settings.frequency_hz)
+        _note_shift(work, fibre, lying)
+
+
+def _note_shift(work: HandlingContext, fibre: HeldFibre, lying: LyingFibre) -> None:
+    """Take note of where a fibre lies that has shifted since it was measured."""
+    if abs(lying.shift_um) > 0.5 * work.settings.grasp.close_enough_um:
+        logger.info("fibre %d has shifted by %.0f um", fibre.number, lying.shift_um)
+        fibre.line_um = line_of(fibre) + np.array([0.0, lying.shift_um])
 
 
 class Refine(FibreOperation):
@@ -178,6 +226,10 @@ class Refine(FibreOperation):
 
 def _off_um(work: HandlingContext, fibre: HeldFibre, image: CameraImage) -> float | None:
     """Return how far the fibre is from the middle between the jaws, in y; None: not seen."""
+    if work.settings.grasp.follow_um > 0.0:
+        lying = LyingFibre(work, fibre, line_of(fibre))
+        lying.follow(image)
+        _note_shift(work, fibre, lying)
     found = see_tip(work, image, work.gripper)
     if not isinstance(found, GripperTips):
         return None

@@ -1,9 +1,9 @@
 """Settings of the operations that handle fibres; they are the parameters of a recipe."""
 
 from collections.abc import Collection
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from cosmic.autonomy.bending.plan import SpanLimits
 from cosmic.autonomy.bending.settings import FitSettings
@@ -126,6 +126,17 @@ class GraspSettings(StrictModel):
         How often a grasp is tried.
     shift_um : float
         How far aside of the first try the second and third are made.
+    follow_um : float
+        How far beside where it was on the image before the fibre is looked for while the jaws come
+        down, which follow it; 0: they come down without looking. At most `clear_um`, so that no
+        other fibre is taken for it.
+    follow_most_um : float
+        How far in all they follow it; farther away the grasp is given up.
+    hover_um : float
+        Height of the jaws' lower edge at which they wait until the fibre is between them.
+    descend_hz : float
+        Closed-loop frequency of the gripper's height as they come down and follow, which limits
+        the speed.
     reach_x_um, reach_y_um : float
         Largest x of a grasp, in the direction the gripper points to, and largest distance in y.
     largest_turn_deg : float
@@ -147,9 +158,19 @@ class GraspSettings(StrictModel):
     corrections: int = Field(3, ge=1, le=10)
     tries: int = Field(4, ge=1, le=10)
     shift_um: float = Field(30.0, ge=0.0)
+    follow_um: float = Field(50.0, ge=0.0, le=200.0)
+    follow_most_um: float = Field(200.0, gt=0.0, le=1000.0)
+    hover_um: float = Field(60.0, gt=0.0)
+    descend_hz: float = Field(1000.0, ge=1.0, le=18500.0)
     reach_x_um: float = 1400.0
     reach_y_um: float = Field(4300.0, gt=0.0)
     largest_turn_deg: float = Field(155.0, gt=0.0)
+
+    @model_validator(mode="after")
+    def _follows_one_fibre(self) -> Self:
+        if not self.follow_um <= self.clear_um:
+            raise ValueError("follow_um lies above clear_um: another fibre could be followed")
+        return self
 
 
 class PushSettings(StrictModel):

@@ -206,7 +206,24 @@ def trace_along(image: CameraImage, line_px: Floats, reach_px: float) -> Trace:
     ground = float(np.percentile(smooth, 75))
     near = np.abs(offsets) <= reach_px
     darkest = int(np.argmin(np.where(near, smooth, np.inf)))
-    return Trace(max(0.0, ground - float(smooth[darkest])), float(offsets[darkest]))
+    depth = ground - float(smooth[darkest])
+    return Trace(max(0.0, depth), _middle_of(offsets, ground - smooth, darkest))
+
+
+def _middle_of(offsets: Floats, depths: Floats, darkest: int) -> float:
+    """Return the middle of what is at least half as dark: a wide fibre is as dark all over."""
+    faint = np.flatnonzero(depths < 0.5 * depths[darkest])
+    before, after = faint[faint < darkest], faint[faint > darkest]
+    if not (len(before) and len(after)):
+        return float(offsets[darkest])
+    left, right = int(before[-1]), int(after[0])
+    half = 0.5 * depths[darkest]
+
+    def crossing(outside: int, inside: int) -> float:
+        part = (half - depths[outside]) / (depths[inside] - depths[outside])
+        return float(offsets[outside] + part * (offsets[inside] - offsets[outside]))
+
+    return 0.5 * (crossing(left, left + 1) + crossing(right, right - 1))
 
 
 def _spaced(line: Floats) -> Floats:

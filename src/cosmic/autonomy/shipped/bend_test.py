@@ -5,6 +5,7 @@ The transport goes the same way and measures nothing.
 
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.grasp import MISSED, Carry, TestGrasp
+from cosmic.autonomy.handling.guided_move import OUT_OF_SIGHT, STRAYED
 from cosmic.autonomy.handling.plate_change import ChangePlate, PlateHandler
 from cosmic.autonomy.handling.prepare import InitialiseAgain, MakeReady, make_safe
 from cosmic.autonomy.handling.push import (
@@ -113,7 +114,7 @@ def grasped(settings: HandlingSettings) -> Part[HandlingContext]:
             "grasp", FindAgain(), Approach(), Refine(), CloseJaws(), TestGrasp()
         ),
         settings.grasp.tries,
-        only={MISSED, TIP_NOT_SEEN},
+        only={MISSED, TIP_NOT_SEEN, OUT_OF_SIGHT, STRAYED},
         between=Shift(),
     )
 

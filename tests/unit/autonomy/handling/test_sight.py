@@ -34,6 +34,17 @@ def test_one_beside_it_is_seen_with_its_distance():
     assert seen.offset_px == pytest.approx(4.85, abs=1.0), "to the left on the screen is up"
 
 
+@pytest.mark.parametrize("aside", [-6.0, 0.0, 4.0])
+def test_a_wide_fibre_is_seen_where_its_middle_is(aside: float):
+    by = np.array([0.0, aside])
+    offsets = [
+        trace_along(image((100, 120, 220, 150), width_px=15), LINE + by, reach).offset_px
+        for reach in (10.0, 14.0)
+    ]
+    normal = 120.0 / np.hypot(120.0, 30.0)
+    assert offsets == pytest.approx([aside * normal] * 2, abs=0.7)
+
+
 @pytest.mark.parametrize(
     "lines",
     [(), ((100.0, 160.0, 220.0, 190.0),), ((160.0, 60.0, 160.0, 250.0),)],

@@ -308,3 +308,19 @@ def test_what_nobody_foresaw_of_an_image_is_reported_and_no_error_of_numpy(
     monkeypatch.setattr("cosmic.vico.core.vision.finding.find_relief", broken)
     with pytest.raises(NotAvailable, match=r"LinAlgError: Singular matrix\); take another"):
         find_fibres(np.full((64, 64), 200, np.uint8))
+
+
+def test_only_the_line_that_is_wanted_is_measured_and_as_it_is_among_all() -> None:
+    other = arc((200.0, 60.0), 0.0, 350.0, 0.2)
+    image = drawn_image([BOW, other], [9.0, 9.0])
+    among = find_fibres(image)
+    asked: list[np.ndarray] = []
+
+    def wanted(line: np.ndarray) -> bool:
+        asked.append(line)
+        return bool((np.linalg.norm(line - np.array([120.0, 180.0]), axis=1) < 15.0).any())
+
+    (alone,) = find_fibres(image, wanted=wanted)
+    assert len(asked) == len(among) == 2
+    np.testing.assert_allclose(alone.centre_line_px, among[0].centre_line_px)
+    assert alone.certain

@@ -1,5 +1,6 @@
 """Fibres found on an image and measured."""
 
+from collections.abc import Callable
 from types import MappingProxyType
 
 import cv2
@@ -55,7 +56,10 @@ CLIPPED_BLURS = 1.5
 MOST_STRANDS = 96
 
 
-def find_fibres(image: npt.NDArray[np.generic]) -> list[Fibre]:
+Wanted = Callable[[Floats], bool]
+
+
+def find_fibres(image: npt.NDArray[np.generic], *, wanted: Wanted | None = None) -> list[Fibre]:
     """Find the fibres on an image and measure them, the longest first.
 
     Parameters
@@ -64,6 +68,9 @@ def find_fibres(image: npt.NDArray[np.generic]) -> list[Fibre]:
         Fibres darker or lighter than the ground. An image of shape (height, width, 3) or
         (height, width, 4) is taken as blue, green, red, opacity and turned to grey; bool, other
         whole numbers and floats are converted as `grey_image` says.
+    wanted : callable or None
+        Says of a line as it is first seen, shape (n, 2), pixels, whether it is measured: that takes
+        most of the time. None: each is.
 
     Returns
     -------
@@ -79,7 +86,7 @@ def find_fibres(image: npt.NDArray[np.generic]) -> list[Fibre]:
     """
     pixels = grey_image(image)
     try:
-        return _found(pixels)
+        return _found(pixels, wanted)
     except (ValueError, ArithmeticError, IndexError, cv2.error) as exc:  # numpy's, scipy's too
         raise NotAvailable(
             f"fibres cannot be looked for on this image, {image.dtype} of shape {image.shape} "
@@ -88,7 +95,7 @@ def find_fibres(image: npt.NDArray[np.generic]) -> list[Fibre]:
         ) from exc
 
 
-def _found(pixels: Pixels) -> list[Fibre]:
+def _found(pixels: Pixels, wanted: Wanted | None) -> list[Fibre]:
     relief = find_relief(pixels)
     if relief.crowded or not relief.mask.any():
         return []
@@ -110,7 +117,10 @@ def _found(pixels: Pixels) -> list[Fibre]:
     crowd = len(kept) > MOST_STRANDS
     kept = kept[:MOST_STRANDS]
     found = [
-        refine(scene, each, neighbours_of(scene, kept, index)) for index, each in enumerate(kept)
+        refine(scene, each, neighbours_of(scene, kept, index))
+        if wanted is None or wanted(scene.full(each.points))
+        else None
+        for index, each in enumerate(kept)
     ]
     kept, found = parted_at_gaps(scene, kept, found)
     kept, found = separated(scene, kept, found, least)

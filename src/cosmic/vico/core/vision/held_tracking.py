@@ -152,7 +152,7 @@ class HeldFibreTracker:
         self._frames += 1
         searches: list[Callable[[], list[_Line]]] = [
             lambda: self._retraced(part, corner, found.hold_px),
-            lambda: [_line_of(each) for each in find_fibres(part)],
+            lambda: [_line_of(each) for each in find_fibres(part, wanted=_from(gripper))],
         ]
         reason = ""
         for search in searches[::-1] if self._frames % ANEW_EVERY == 0 else searches:
@@ -272,6 +272,13 @@ class HeldFibreTracker:
         state = TrackState.UNSURE if doubts else TrackState.FOUND
         moved = _moved(shape, corner)
         return HeldTrack(state, moved, (x, y), std, self._velocity, "; ".join(doubts))
+
+
+def _from(gripper: GripperTips) -> Callable[[Floats], bool]:
+    """Return what says of a line whether it may come out between the jaws."""
+    hold = np.array(gripper.hold_px)
+    reach = BEHIND_PX + 0.5 * gripper.gap_px + max(jaw.width_px for jaw in gripper.jaws)
+    return lambda line: bool((np.linalg.norm(line - hold, axis=1) <= reach).any())
 
 
 def _line_of(fibre: Fibre) -> _Line:
