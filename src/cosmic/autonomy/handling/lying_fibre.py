@@ -60,7 +60,7 @@ class LyingFibre:
         # It goes on as it went.
         foreseen = self.shift_um + self._step_um
         points = mapped.to_px(self._ahead + np.array([0.0, foreseen]))
-        reach_px = self._work.settings.grasp.follow_um / mapped.scale_um_px
+        reach_px = self._work.settings.grasp.followed_um / mapped.scale_um_px
         trace = trace_along(image, points, reach_px)
         if not self._is_it(trace.contrast):
             self._step_um = 0.0

@@ -168,9 +168,14 @@ class GraspSettings(StrictModel):
 
     @model_validator(mode="after")
     def _follows_one_fibre(self) -> Self:
-        if not self.follow_um <= self.clear_um:
+        if "follow_um" in self.model_fields_set and not self.follow_um <= self.clear_um:
             raise ValueError("follow_um lies above clear_um: another fibre could be followed")
         return self
+
+    @property
+    def followed_um(self) -> float:
+        """`follow_um`, and no more than `clear_um` where that alone was given."""
+        return min(self.follow_um, self.clear_um)
 
 
 class PushSettings(StrictModel):

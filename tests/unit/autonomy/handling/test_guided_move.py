@@ -215,3 +215,4 @@ def test_a_window_in_which_another_fibre_may_lie_is_refused():
     with pytest.raises(ValueError, match="follow_um lies above clear_um"):
         GraspSettings(follow_um=56.0)
     assert GraspSettings(follow_um=56.0, clear_um=60.0).follow_um == 56.0
+    assert GraspSettings(clear_um=30.0).followed_um == 30.0, "recipes of before stay valid"
