@@ -270,8 +270,8 @@ def _askew(sign: Floats, same: np.ndarray, settings: FitSettings) -> Floats:
 def _freed(fits: Sequence[SpanFit], rows: Sequence["_Row"]) -> tuple[Floats, Floats] | None:
     """Return what is to be added to ln(k), and its covariance; None: friction never let go.
 
-    On the way out a section askew was as much too stiff as the force fell once friction let go;
-    where that was not tried, as much as in the other spans, but for twist. On the way back it may
+    On the way out a section askew was as much too stiff as the force fell once friction let go, and
+    as in the other spans, but for twist: each counts by how well it is known. On the way back it may
     have turned round, by any part of that: how far depends on the section.
     """
     logs = np.array([each.freed_log for each in fits])
@@ -282,8 +282,11 @@ def _freed(fits: Sequence[SpanFit], rows: Sequence["_Row"]) -> tuple[Floats, Flo
     weights = 1.0 / np.maximum(stds[known], LEAST_STD) ** 2
     mean = float(weights @ logs[known] / weights.sum())
     twisted = math.hypot(TWISTED * mean, TWISTED_LEAST)
-    logs = np.where(known, logs, mean)
-    stds = np.where(known, stds, math.hypot(twisted, float(weights.sum() ** -0.5)))
+    # A slide of a short span tells little: it is taken together with what the others show.
+    by_others = math.hypot(twisted, float(weights.sum() ** -0.5))
+    own = np.where(known, by_others**2 / (by_others**2 + np.where(known, stds, 0.0) ** 2), 0.0)
+    logs = mean + own * np.where(known, logs - mean, 0.0)
+    stds = by_others * np.sqrt(1.0 - own)
     span = np.array([each.span for each in rows])
     out = np.array([each.sign > 0.0 for each in rows])
     of_out = np.diag(stds[span] ** 2) * np.outer(out, out)

@@ -53,6 +53,26 @@ def test_spans_that_were_not_slid_are_taken_to_be_held_like_the_others_and_less_
     assert half_width_percent(one_slid) > half_width_percent(all_slid)
 
 
+def test_a_slide_at_a_short_push_tells_little_for_the_probe_comes_back_only_so_well() -> None:
+    span = held(pushed(rig())[0], up=0.9, down=0.9)
+    level = np.full(len(span.probe_um), LEVEL_UN)
+    before_un = float(span.force_un[AFTER]) - LEVEL_UN
+    exact = freed_of(span, level, 0.0)
+    known = freed_of(span, level, 0.0, way_std_un=0.15 * before_un)
+    assert known[0] == exact[0] == pytest.approx(math.log(0.9))
+    assert known[1] == pytest.approx(math.hypot(exact[1], 0.15))
+
+
+def test_what_a_slide_shows_is_known_as_well_as_the_stage_repeats() -> None:
+    span = held(min(pushed(rig()), key=lambda each: each.nominal_um), up=0.9, down=0.9)
+    (found,) = fit_bending([span], settings=FitSettings(way_std_um=0.1)).spans
+    force_un = float(span.force_un[AFTER]) - LEVEL_UN
+    repeats_part = found.k_loading_un_um * 0.1 / force_un
+    assert found.freed_std_part == pytest.approx(repeats_part, rel=0.2)
+    (exact,) = fit_bending([span], settings=FitSettings(way_std_um=0.001)).spans
+    assert exact.freed_std_part < 0.5 * found.freed_std_part
+
+
 @pytest.mark.parametrize(
     ("freed", "why"),
     [
