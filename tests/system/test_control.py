@@ -133,7 +133,7 @@ def by_halt(bench: Bench, loop: ControlHandle) -> None:
 
 
 def by_limit_of_the_loop(bench: Bench, loop: ControlHandle) -> None:
-    bench.rig.daqco.set_scale("force", Scale("shifted", "uN", (150.0, 100.0)))
+    bench.rig.faults.inject("sensor_saturated")
 
 
 def by_limit_of_the_channel(bench: Bench, loop: ControlHandle) -> None:
@@ -142,6 +142,10 @@ def by_limit_of_the_channel(bench: Bench, loop: ControlHandle) -> None:
 
 def by_another_unit(bench: Bench, loop: ControlHandle) -> None:
     bench.rig.daqco.set_scale("force", Scale("other", "mN", (-0.25, 0.1)))
+
+
+def by_another_scale(bench: Bench, loop: ControlHandle) -> None:
+    bench.rig.daqco.set_scale("force", Scale("a fifth", "uN", (-50.0, 20.0)))
 
 
 def by_silence(bench: Bench, loop: ControlHandle) -> None:
@@ -158,6 +162,7 @@ def by_dead_thread(bench: Bench, loop: ControlHandle) -> None:
 
 def undo(bench: Bench) -> None:
     rig = bench.rig
+    rig.faults.clear()
     rig.daqco.application.library.faults.clear()  # type: ignore[attr-defined]
     rig.daqco.remove_limit("force")
     rig.daqco.set_scale("force", rig.daqco.settings.scales()["FT-S540"])
@@ -171,6 +176,7 @@ WAYS: dict[Callable[[Bench, ControlHandle], None], str] = {
     by_limit_of_the_loop: "limit",
     by_limit_of_the_channel: "stopped",
     by_another_unit: "device",
+    by_another_scale: "device",
     by_silence: "no data",
     by_dead_thread: "defect",
 }
@@ -296,6 +302,8 @@ def test_numbers_that_make_no_sense_are_named_in_plain_words(far: Bench) -> None
         ({"setpoint_un": math.nan}, cosmic.LimitError),
         ({"direction": 0}, cosmic.ConfigError),
         ({"limit_un": math.inf}, cosmic.ConfigError),
+        ({"setpoint_un": 5000.0, "limit_un": 10_000.0}, cosmic.ConfigError),
+        ({"setpoint_un": 240.0, "limit_un": 260.0}, cosmic.ConfigError),
         ({"travel_um": -1.0}, cosmic.ConfigError),
         ({"ramp_un_s": math.nan}, cosmic.ConfigError),
         ({"tolerance_un": 0.0}, cosmic.ConfigError),
@@ -309,6 +317,14 @@ def test_what_cannot_be_is_refused_before_anything_moves(
         far.rig.control.hold_force(**(usual | asked))  # type: ignore[arg-type]
     assert far.rig.control.loops == ()
     assert far.truth_um() == pytest.approx(-4500.0, abs=1.0)
+
+
+def test_a_value_that_its_channel_cannot_measure_is_refused(far: Bench) -> None:
+    with pytest.raises(cosmic.LimitError, match="cannot be held: it measures from -250 to 250 uN"):
+        far.rig.control.hold(
+            "force", "probe.y", 300.0, PidGains(0.1), speed=10.0, travel=50.0, tolerance=1.0
+        )
+    assert far.rig.control.loops == ()
 
 
 def test_a_stop_that_is_latched_is_reported_at_the_begin(far: Bench) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from threading import Lock
 
 from cosmic.autonomy.control.force_servo import ForceGoal, ForceServo
-from cosmic.autonomy.control.handle import ControlHandle, check_inside
+from cosmic.autonomy.control.handle import ControlHandle, check_inside, check_measurable
 from cosmic.autonomy.control.law import Law, PidLaw
 from cosmic.autonomy.control.loop import ControlLoop
 from cosmic.autonomy.control.parts import LoopParts
@@ -143,7 +143,7 @@ class Control:
         ConfigError, UnknownAxisError
             No such channel or axis, or numbers that make no sense.
         LimitError
-            The set point does not lie inside the limits.
+            The set point does not lie inside the limits, or inside what the channel can measure.
         NotAvailable
             Nothing is acquired, the axis moves, or a loop has it already.
         StoppedError
@@ -151,12 +151,13 @@ class Control:
         """
         parts = self._parts()
         parts.check_acquisition()
+        check_inside(channel, "uN", setpoint_un, (-math.inf, math.inf))
         settings = parts.settings(travel_um=travel_um, ramp_un_s=ramp_un_s)
         limits = parts.force_limits(channel, setpoint_un, limit_un)
-        goal = _force_goal(channel, setpoint_un, limits, direction, settings, tolerance_un)
         source = parts.channel(channel, settings, limits)
         if source.unit != "uN":
             raise ConfigError(f"{channel} is measured in {source.unit}; a force must be in uN")
+        goal = _force_goal(channel, setpoint_un, limits, direction, settings, tolerance_un)
         return self._begin(
             source,
             ForceServo(goal, settings, gains),
@@ -256,6 +257,7 @@ class Control:
         tolerance: float,
         limits: tuple[float, float],
     ) -> ControlHandle:
+        check_measurable(source, set_point)
         loop = ControlLoop(source, law, sink, settings, rate=self._rate, policy=self._policy)
         handle = ControlHandle(
             loop,

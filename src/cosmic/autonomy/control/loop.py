@@ -226,7 +226,9 @@ class ControlLoop(WorkerThread):
             self._cycle(passed_s)
 
     def _cycle(self, passed_s: float) -> None:
-        dt_s = passed_s * self._rate
+        # Speeds are such that what happens within the latency is safe: a cycle that comes later,
+        # for the computer stood still, makes up for nothing.
+        dt_s = min(passed_s * self._rate, self._settings.latency_s)
         sample = self._fresh()
         if sample is None or WALL.now_s() - sample.read_wall_s > self.source.pause_s:
             self.sink.brake(dt_s)
