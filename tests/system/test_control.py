@@ -264,6 +264,21 @@ def test_the_gate_decides_every_move_of_a_loop(far: Bench) -> None:
     axis.move_to(0.0)
 
 
+def test_a_position_is_not_held_by_driving_it_away(far: Bench) -> None:
+    with pytest.raises(cosmic.ConfigError, match=r"probe\.x: its own position rises"):
+        far.rig.control.hold(
+            "probe.x",
+            "probe.x",
+            100.0,
+            PidGains(1.0),
+            direction=-1,
+            speed=50.0,
+            travel=200.0,
+            tolerance=1.0,
+        )
+    assert far.rig.control.loops == ()
+
+
 def test_a_new_set_point_beyond_the_limits_is_refused_and_the_old_one_stays(far: Bench) -> None:
     with far.hold(limit_un=60.0) as loop:
         with pytest.raises(cosmic.LimitError, match="does not lie inside"):

@@ -212,6 +212,9 @@ class Control:
             raise ConfigError(f"tolerance must be a number above 0, got {tolerance!r}")
         origin = parts.source(source, settings, limits)
         sink = AxisSink(self._mico, axis, speed=speed, travel=travel, interval_s=settings.latency_s)
+        if origin.name == sink.name and direction == -1:
+            text = "its own position rises while it moves forward; direction must be 1"
+            raise ConfigError(f"{sink.name}: {text}")
         law = PidLaw(
             set_point,
             gains,
