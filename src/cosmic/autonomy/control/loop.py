@@ -173,9 +173,13 @@ class ControlLoop(WorkerThread):
                 self.state = ControlState.ENDED
         if not first:
             return
-        self.sink.close(error)
-        self._end_requested.set()
-        self._timer.end()
+        try:
+            self.sink.close(error)
+        except CosmicError as exc:  # its station is lost: what it commands ends there by itself
+            logger.error("control loop: %s could not be stopped: %s", self.sink.name, exc)
+        finally:
+            self._end_requested.set()
+            self._timer.end()
         log = logger.info if error is None else logger.warning
         log("control loop: %s by %s ended: %s", self.source.name, self.sink.name, self.reason)
 

@@ -1,5 +1,6 @@
-"""A loop whose thread stands still for a while does not make up for it."""
+"""A control loop when its thread stands still, or its axis is gone."""
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,6 +11,7 @@ from cosmic.autonomy.control.loop import ControlLoop
 from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.autonomy.control.sources import Sample
 from cosmic.frame.clock import WALL
+from cosmic.frame.errors import NotConnectedError
 from cosmic.frame.failure import FailurePolicy
 from unit.mico.rigs import wait_until
 
@@ -29,11 +31,9 @@ class StallingLaw:
         return Answer(1.0, measured, ControlState.HOLDING)
 
 
-@pytest.mark.parametrize("rate", [1.0, 2.0])
-def test_a_cycle_that_comes_late_counts_no_longer_than_the_latency(rate: float):
-    settings = ControlSettings(real_time=False)
-    law, moved_s = StallingLaw(), []
-    source: Any = SimpleNamespace(
+def source() -> Any:
+    """Ten of something, whenever it is asked for."""
+    return SimpleNamespace(
         name="force",
         stale_s=1.0,
         pause_s=1.0,
@@ -41,16 +41,26 @@ def test_a_cycle_that_comes_late_counts_no_longer_than_the_latency(rate: float):
         newest=lambda: Sample(10.0, WALL.now_s()),
         end=lambda: None,
     )
-    sink: Any = SimpleNamespace(
+
+
+def sink(moved_s: list[float], close: Callable[[object], object] = lambda _error: None) -> Any:
+    """An axis that notes for how long it was to move."""
+    return SimpleNamespace(
         name="probe.y",
         zero=0.0,
         target=0.0,
         packets=0,
         begin=lambda: None,
         move=lambda _velocity, dt_s: moved_s.append(dt_s),
-        close=lambda _error: None,
+        close=close,
     )
-    loop = ControlLoop(source, law, sink, settings, rate=rate, policy=FailurePolicy())
+
+
+@pytest.mark.parametrize("rate", [1.0, 2.0])
+def test_a_cycle_that_comes_late_counts_no_longer_than_the_latency(rate: float):
+    settings = ControlSettings(real_time=False)
+    law, moved_s = StallingLaw(), list[float]()
+    loop = ControlLoop(source(), law, sink(moved_s), settings, rate=rate, policy=FailurePolicy())
     loop.begin()
     try:
         wait_until(lambda: len(law.given_s) > 5)
@@ -59,3 +69,22 @@ def test_a_cycle_that_comes_late_counts_no_longer_than_the_latency(rate: float):
         loop.join()
     assert max(law.given_s) <= settings.latency_s
     assert max(moved_s) <= settings.latency_s
+
+
+def test_a_loop_whose_axis_cannot_be_stopped_any_more_ends_and_says_so(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def close(_error: object) -> None:
+        raise NotConnectedError("the station fibres does not answer")
+
+    settings = ControlSettings(real_time=False)
+    moved_s: list[float] = []
+    loop = ControlLoop(
+        source(), StallingLaw(), sink(moved_s, close), settings, rate=1.0, policy=FailurePolicy()
+    )
+    loop.begin()
+    wait_until(lambda: moved_s)
+    loop.finish()
+    assert loop.over.wait(5.0) == "asked to"
+    assert loop.join()
+    assert "probe.y could not be stopped: the station fibres does not answer" in caplog.text
