@@ -1,6 +1,7 @@
 """`CalibrationRegistry`: what was measured, how well, when, with what, and whether it holds."""
 
 import logging
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -200,14 +201,28 @@ class CalibrationRegistry:
         return None if found is None or found.problem else found
 
     def put(self, entry: CalibrationEntry) -> None:
-        """Put one in force, and keep it; raises `ConfigError` where it cannot be written."""
+        """Put one in force, and keep it.
+
+        Raises
+        ------
+        ConfigError
+            It cannot be written, or holds what is no number: then all stays as it was.
+        """
+        numbers = {**entry.values, "residual": entry.residual, "largest": entry.largest}
+        wrong = [name for name, value in numbers.items() if not math.isfinite(value)]
+        if wrong:
+            names = ", ".join(wrong)
+            raise ConfigError(f"{entry.name} of {entry.tool}: {names}: no number; measure it again")
         with self._lock:
             self._known[entry.key] = replace(entry, session=self.session, version=self.version)
         self._write()
 
     def refuse(self, entry: CalibrationEntry, problem: str) -> None:
         """Note that one was refused; what was in force before is none any more."""
-        self.put(replace(entry, problem=problem))
+        # What is no number cannot be kept; `problem` says it.
+        values = {name: value for name, value in entry.values.items() if math.isfinite(value)}
+        residual = entry.residual if math.isfinite(entry.residual) else 0.0
+        self.put(replace(entry, values=values, residual=residual, problem=problem))
 
     def confirm(self, entry: CalibrationEntry, now_s: float) -> CalibrationEntry:
         """Note that one was looked at and holds, and return it as it stands now."""
