@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from shutil import copytree
+from threading import Event, Thread
 
 import pytest
 
@@ -11,6 +12,7 @@ import cosmic
 from cosmic.app import platform as platform_module
 from cosmic.autonomy.control.handle import ControlHandle
 from cosmic.autonomy.control.pid import PidGains
+from cosmic.autonomy.control.sink import AxisSink
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.clock import WALL
 from cosmic.frame.config import shipped_config_dir
@@ -262,6 +264,41 @@ def test_the_gate_decides_every_move_of_a_loop(far: Bench) -> None:
         loop.wait_settled(timeout_s=10.0)
     assert far.truth_um("probe.x") <= 5500.5
     axis.move_to(0.0)
+
+
+def test_all_loops_are_stopped_at_once_while_another_one_begins(
+    far: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    running = far.hold()
+    entered, released, begin = Event(), Event(), AxisSink.begin
+
+    def slow(sink: AxisSink) -> None:
+        entered.set()
+        released.wait(10.0)
+        begin(sink)
+
+    monkeypatch.setattr(AxisSink, "begin", slow)
+    control, begun = far.rig.control, list[ControlHandle]()
+
+    def another() -> None:
+        gains = PidGains(1.0)
+        held = control.hold(
+            "probe.x", "probe.x", 0.0, gains, speed=10.0, travel=50.0, tolerance=1.0
+        )
+        begun.append(held)
+
+    begins, stops = Thread(target=another), Thread(target=control.stop)
+    begins.start()
+    try:
+        assert entered.wait(5.0)
+        stops.start()
+        assert running.wait(1.0) == "asked to"
+        assert not begun
+    finally:
+        released.set()
+        begins.join()
+        stops.join()
+    assert begun[0].wait(5.0) == "asked to"
 
 
 def test_a_position_is_not_held_by_driving_it_away(far: Bench) -> None:

@@ -228,7 +228,9 @@ class Control:
         )
 
     def stop(self) -> None:
-        """End all loops; each stops its axis. Returns at once."""
+        """End all loops; each stops its axis. One that just begins is waited for, and ended."""
+        for handle in self._all.by_axis.values():
+            handle.stop()
         for handle in self.loops:
             handle.stop()
 
@@ -280,7 +282,9 @@ class Control:
             if other is not None:
                 other.join()
             loop.begin()
-            self._all.by_axis[sink.name] = self._all.newest = handle
+            # A copy, so that whoever stops all loops waits for none that begins.
+            self._all.by_axis = {**self._all.by_axis, sink.name: handle}
+            self._all.newest = handle
         return handle
 
 
