@@ -10,6 +10,8 @@ from cosmic.frame.threads import WorkerThread
 
 STALL_S: Final = 5.0
 """So long a call of a driver may take before it is told."""
+OPEN_S: Final = 20.0
+"""The same while a device is opened, which may look for it in several places."""
 _LOOK_S: Final = 0.5
 
 

@@ -23,7 +23,7 @@ from cosmic.frame.errors import (
 )
 from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.heartbeat import Heartbeat
+from cosmic.frame.heartbeat import OPEN_S, Heartbeat
 from cosmic.frame.operation import Task
 from cosmic.frame.threads import WorkerThread, forbid_waiting_here
 from cosmic.vico.core.image import CameraImage, Circumstances
@@ -41,8 +41,6 @@ from cosmic.vico.hw.interface import (
 logger = logging.getLogger(__name__)
 
 LOOK_S: Final = 0.05
-OPEN_S: Final = 20.0
-"""So long a driver may take to open a camera before it is told."""
 SHOWN_HZ: Final = 40.0
 LOOKED_S: Final = 1.0
 SEARCH_S: Final = 1.0

@@ -13,7 +13,7 @@ from typing_extensions import override
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.heartbeat import Heartbeat
+from cosmic.frame.heartbeat import OPEN_S, Heartbeat
 from cosmic.frame.network.caller import current_call
 from cosmic.frame.operation import Task
 from cosmic.frame.threads import WorkerThread
@@ -245,7 +245,6 @@ class PeripheralThread(WorkerThread):
     @override
     def run_body(self) -> None:
         try:
-            self.heartbeat.beat()
             self._open()
             while not self.end_requested:
                 self.heartbeat.beat()
@@ -259,6 +258,7 @@ class PeripheralThread(WorkerThread):
             self.heartbeat.end()
 
     def _open(self) -> None:
+        self.heartbeat.beat(OPEN_S)
         self._lens.open()
         self._light.open()
         self._lens.look()
