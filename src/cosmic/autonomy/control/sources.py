@@ -195,8 +195,10 @@ class ChannelSource(Source):
         """Return what is no longer as when the loop was made; None where all is."""
         begun, now = self._settings, self._daqco.settings
         name = self._channel
-        if now is not begun and (changed := changed_quantity(name, begun, now)):
-            return changed
+        if now is not begun:
+            if changed := changed_quantity(name, begun, now):
+                return changed
+            self._settings = now  # of the same quantity: it is compared once
         if name not in chunk.channels:
             return f"there is no channel {name} any more: renamed, or switched off"
         scale = chunk.scales[chunk.channels.index(name)]
