@@ -102,6 +102,38 @@ def test_what_is_no_number_is_never_in_force_and_keeps_nothing_else_from_being_k
     assert len(CalibrationRegistry(tmp_path / "kept").entries) == 2
 
 
+def test_what_others_do_to_the_file_meanwhile_stays(
+    registry: CalibrationRegistry, tmp_path: Path
+) -> None:
+    registry.put(entry(registry, "first"))
+    registry.put(entry(registry, "second"))
+    other = CalibrationRegistry(tmp_path / "kept")
+    other.put(entry(other, "third"))
+    other.forget("first", "left")
+    registry.put(entry(registry, "fourth"))
+    kept = CalibrationRegistry(tmp_path / "kept").entries
+    assert [each.name for each in kept] == ["fourth", "second", "third"]
+    assert [each.name for each in registry.entries] == ["fourth", "second", "third"]
+    found = registry.get("third", "left")
+    assert found is not None
+    assert registry.standing(found) is CalibrationStanding.UNCHECKED
+    other.put(entry(other, "second", residual=3.0))
+    registry.put(entry(registry, "second", residual=1.0))
+    assert {each.name: each.residual for each in registry.entries}["second"] == 1.0
+
+
+def test_a_file_that_became_wrong_meanwhile_stays_and_is_named(
+    registry: CalibrationRegistry, tmp_path: Path
+) -> None:
+    registry.put(entry(registry))
+    file = tmp_path / "kept" / "calibrations.toml"
+    file.write_text("format = 1\n[[entry", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"calibrations\.toml: not valid TOML"):
+        registry.put(entry(registry, "depth"))
+    assert file.read_text(encoding="utf-8") == "format = 1\n[[entry"
+    assert registry.get("depth", "left") is not None
+
+
 def test_one_is_forgotten_and_listeners_are_notified(registry: CalibrationRegistry) -> None:
     counts: list[int] = []
     forget = registry.on_change(lambda: counts.append(len(registry.entries)))
