@@ -86,7 +86,7 @@ class VicoApplication(TaskApplication):
             for config in settings.camera
         }
         self._watch = HeartbeatWatch(
-            "drivers of ViCo",
+            "driver watch",
             [self.peripherals.heartbeat, *(each.thread.heartbeat for each in self.units.values())],
             policy,
         )
