@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from shutil import copytree
+from threading import Event, Thread
 
 import pytest
 
@@ -11,6 +12,7 @@ import cosmic
 from cosmic.app import platform as platform_module
 from cosmic.autonomy.control.handle import ControlHandle
 from cosmic.autonomy.control.pid import PidGains
+from cosmic.autonomy.control.sink import AxisSink
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.clock import WALL
 from cosmic.frame.config import shipped_config_dir
@@ -133,7 +135,7 @@ def by_halt(bench: Bench, loop: ControlHandle) -> None:
 
 
 def by_limit_of_the_loop(bench: Bench, loop: ControlHandle) -> None:
-    bench.rig.daqco.set_scale("force", Scale("shifted", "uN", (150.0, 100.0)))
+    bench.rig.faults.inject("sensor_saturated")
 
 
 def by_limit_of_the_channel(bench: Bench, loop: ControlHandle) -> None:
@@ -142,6 +144,10 @@ def by_limit_of_the_channel(bench: Bench, loop: ControlHandle) -> None:
 
 def by_another_unit(bench: Bench, loop: ControlHandle) -> None:
     bench.rig.daqco.set_scale("force", Scale("other", "mN", (-0.25, 0.1)))
+
+
+def by_another_scale(bench: Bench, loop: ControlHandle) -> None:
+    bench.rig.daqco.set_scale("force", Scale("a fifth", "uN", (-50.0, 20.0)))
 
 
 def by_silence(bench: Bench, loop: ControlHandle) -> None:
@@ -158,6 +164,7 @@ def by_dead_thread(bench: Bench, loop: ControlHandle) -> None:
 
 def undo(bench: Bench) -> None:
     rig = bench.rig
+    rig.faults.clear()
     rig.daqco.application.library.faults.clear()  # type: ignore[attr-defined]
     rig.daqco.remove_limit("force")
     rig.daqco.set_scale("force", rig.daqco.settings.scales()["FT-S540"])
@@ -171,6 +178,7 @@ WAYS: dict[Callable[[Bench, ControlHandle], None], str] = {
     by_limit_of_the_loop: "limit",
     by_limit_of_the_channel: "stopped",
     by_another_unit: "device",
+    by_another_scale: "device",
     by_silence: "no data",
     by_dead_thread: "defect",
 }
@@ -258,6 +266,56 @@ def test_the_gate_decides_every_move_of_a_loop(far: Bench) -> None:
     axis.move_to(0.0)
 
 
+def test_all_loops_are_stopped_at_once_while_another_one_begins(
+    far: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    running = far.hold()
+    entered, released, begin = Event(), Event(), AxisSink.begin
+
+    def slow(sink: AxisSink) -> None:
+        entered.set()
+        released.wait(10.0)
+        begin(sink)
+
+    monkeypatch.setattr(AxisSink, "begin", slow)
+    control, begun = far.rig.control, list[ControlHandle]()
+
+    def another() -> None:
+        gains = PidGains(1.0)
+        held = control.hold(
+            "probe.x", "probe.x", 0.0, gains, speed=10.0, travel=50.0, tolerance=1.0
+        )
+        begun.append(held)
+
+    begins, stops = Thread(target=another), Thread(target=control.stop)
+    begins.start()
+    try:
+        assert entered.wait(5.0)
+        stops.start()
+        assert running.wait(1.0) == "asked to"
+        assert not begun
+    finally:
+        released.set()
+        begins.join()
+        stops.join()
+    assert begun[0].wait(5.0) == "asked to"
+
+
+def test_a_position_is_not_held_by_driving_it_away(far: Bench) -> None:
+    with pytest.raises(cosmic.ConfigError, match=r"probe\.x: its own position rises"):
+        far.rig.control.hold(
+            "probe.x",
+            "probe.x",
+            100.0,
+            PidGains(1.0),
+            direction=-1,
+            speed=50.0,
+            travel=200.0,
+            tolerance=1.0,
+        )
+    assert far.rig.control.loops == ()
+
+
 def test_a_new_set_point_beyond_the_limits_is_refused_and_the_old_one_stays(far: Bench) -> None:
     with far.hold(limit_un=60.0) as loop:
         with pytest.raises(cosmic.LimitError, match="does not lie inside"):
@@ -296,6 +354,8 @@ def test_numbers_that_make_no_sense_are_named_in_plain_words(far: Bench) -> None
         ({"setpoint_un": math.nan}, cosmic.LimitError),
         ({"direction": 0}, cosmic.ConfigError),
         ({"limit_un": math.inf}, cosmic.ConfigError),
+        ({"setpoint_un": 5000.0, "limit_un": 10_000.0}, cosmic.ConfigError),
+        ({"setpoint_un": 240.0, "limit_un": 260.0}, cosmic.ConfigError),
         ({"travel_um": -1.0}, cosmic.ConfigError),
         ({"ramp_un_s": math.nan}, cosmic.ConfigError),
         ({"tolerance_un": 0.0}, cosmic.ConfigError),
@@ -309,6 +369,14 @@ def test_what_cannot_be_is_refused_before_anything_moves(
         far.rig.control.hold_force(**(usual | asked))  # type: ignore[arg-type]
     assert far.rig.control.loops == ()
     assert far.truth_um() == pytest.approx(-4500.0, abs=1.0)
+
+
+def test_a_value_that_its_channel_cannot_measure_is_refused(far: Bench) -> None:
+    with pytest.raises(cosmic.LimitError, match="cannot be held: it measures from -250 to 250 uN"):
+        far.rig.control.hold(
+            "force", "probe.y", 300.0, PidGains(0.1), speed=10.0, travel=50.0, tolerance=1.0
+        )
+    assert far.rig.control.loops == ()
 
 
 def test_a_stop_that_is_latched_is_reported_at_the_begin(far: Bench) -> None:

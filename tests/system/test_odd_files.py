@@ -1,8 +1,10 @@
 """Whatever stands in a file that somebody hands over: it is read, or the file is named."""
 
+import os
 import random
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -11,6 +13,7 @@ from cosmic.app.configuration.check import find_mistakes
 from cosmic.app.configuration.platform_file import load_platform
 from cosmic.app.configuration.references import kept_mistakes
 from cosmic.autonomy.campaign.opening import read_recipe
+from cosmic.autonomy.recorded.steps import load_recorded
 from cosmic.frame.config import load_model
 from cosmic.frame.errors import CosmicError
 from cosmic.mico.core.collision.scene_loader import load_scene
@@ -18,6 +21,7 @@ from cosmic.mico.core.poses import read_poses
 from cosmic.mico.core.teleoperation.profile_book import ProfileBook
 from cosmic.mico.core.teleoperation.settings import TeleoperationSettings
 from cosmic.mico.core.trajectory.parser import load as load_trajectory
+from cosmic.mico.hw.recorded_input import read_events
 from cosmic.twin.settings import TwinSettings
 
 DEEP = 50_000
@@ -98,6 +102,25 @@ def test_an_odd_file_is_refused_by_name_whatever_reads_it(name: str, tmp_path: P
         if found := complaint(LOADERS[name], path):
             wrong.append(f"{what}: {found}")
     assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+@pytest.mark.parametrize("name", [*LOADERS, "inputs", "recorded"])
+def test_a_pipe_in_the_place_of_a_file_is_refused_and_not_waited_for(
+    name: str, tmp_path: Path
+) -> None:
+    loaders = LOADERS | {"inputs": read_events, "recorded": load_recorded}
+    path = tmp_path / "pipe.toml"
+    os.mkfifo(path)
+    writer = Thread(target=path.write_bytes, args=(b"",))  # who waits for it gets an end
+    writer.start()
+    try:
+        with pytest.raises(CosmicError, match=r"pipe\.toml.*is a pipe or a device"):
+            loaders[name](path)
+    finally:
+        reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        writer.join()
+        os.close(reader)
 
 
 SHIPPED = {

@@ -8,6 +8,7 @@ import pytest
 
 import cosmic
 from cosmic.app.rig import Rig
+from cosmic.daqco.core.scale import Scale
 from cosmic.frame.clock import WALL
 from cosmic.mico.core.teleoperation.state import TeleoperationPhase as Phase
 from cosmic.mico.hw.interface import Channel
@@ -177,3 +178,29 @@ def test_the_force_channel_is_not_renamed_while_it_is_felt_and_its_lack_is_repor
         daqco.apply(before)
         teleoperation.start(pad.key, "left assembly")
         teleoperation.stop()
+
+
+def test_a_channel_that_measures_no_force_and_a_board_that_is_lost_let_nothing_go_on():
+    with cosmic.connect(applications=("mico", "daqco")) as rig, VirtualGamepad() as pad:
+        teleoperation, daqco = rig.mico.teleoperation, rig.daqco
+        daqco.disarm_limit("force")
+        before = daqco.scales["force"]
+        teleoperation.start(pad.key, "left assembly")
+        with pytest.raises(cosmic.NotAvailable, match=r"in one of .*; it is in V.*Stop steering"):
+            daqco.set_scale("force", Scale("raw", "V"))
+        teleoperation.stop()
+        daqco.set_scale("force", Scale("raw", "V"))
+        with pytest.raises(cosmic.NotAvailable, match="needs the channel force in one of"):
+            teleoperation.start(pad.key, "left assembly")
+        daqco.set_scale("force", before)
+        teleoperation.start(pad.key, "left assembly")
+        wait_until(lambda: teleoperation.state.slowed == 1.0)
+        daqco.application.library.faults.inject("unplugged", board="Dev1")
+        wait_until(lambda: not daqco.running)
+        WALL.sleep(0.3)
+        assert teleoperation.state.slowed == 0.0
+        teleoperation.stop()
+        teleoperation.start(pad.key, "left assembly")
+        WALL.sleep(0.3)
+        assert teleoperation.state.slowed == 1.0, "begun without a force, which is seen"
+        daqco.application.library.faults.clear()

@@ -13,6 +13,7 @@ from typing import Final
 
 from typing_extensions import override
 
+from cosmic.autonomy.interlocks import MICRONEWTONS
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.settings import DaqcoSettings
@@ -87,7 +88,10 @@ class TestAppDAQCoConverter:
         if settings.force_channel not in chunk.channels:
             return
         row = chunk.channels.index(settings.force_channel)
-        force_un = float(chunk.scales[row].apply(chunk.volts[row]).mean())
+        scale = chunk.scales[row]
+        # What is no force is no number here, and lets nothing go on.
+        factor = MICRONEWTONS.get(scale.unit, math.nan)
+        force_un = factor * float(scale.apply(chunk.volts[row]).mean())
         self._force_un, self._taken_wall_s = force_un, WALL.now_s()
         share = force_un / settings.feedback_un * settings.force_direction
         # A value that is no number is no force, and nothing to push a hand with.
@@ -179,12 +183,22 @@ def join_teleoperation(mico: Mico, daqco: DaqcoApplication) -> TestAppDAQCoConve
     Chunks are taken while something is steered; returns what takes them.
     """
     teleoperation = mico.teleoperation
-    force = TestAppDAQCoConverter(teleoperation.settings, teleoperation.feel, lambda: daqco.running)
+    wanted = teleoperation.settings.force_channel
     ends: list[Callable[[], None]] = []
+    chunks_before = 0
+
+    def expected() -> bool:
+        """Return whether samples are due; a board that is lost while steering still owes them."""
+        lost = bool(daqco.problem) and force.chunks > chunks_before
+        return daqco.running or lost
+
+    force = TestAppDAQCoConverter(teleoperation.settings, teleoperation.feel, expected)
 
     def begin() -> None:
+        nonlocal chunks_before
+        chunks_before = force.chunks
         force.restart()
-        if teleoperation.settings.force_channel:
+        if wanted:
             ends.append(daqco.buffer.subscribe(force.take))
 
     def end() -> None:
@@ -196,25 +210,32 @@ def join_teleoperation(mico: Mico, daqco: DaqcoApplication) -> TestAppDAQCoConve
         begin=begin,
         end=end,
         slowed=lambda: force.share,
-        problem=lambda: _missing(daqco.settings) if daqco.running else "",
+        problem=lambda: _missing(wanted, daqco.settings) if daqco.running else "",
     )
 
-    def _missing(settings: DaqcoSettings) -> str:
-        wanted = teleoperation.settings.force_channel
-        active = [each.name for each in settings.channel if each.active]
-        if not wanted or wanted in active:
-            return ""
-        return (
-            f"force feedback needs the channel {wanted}, and there is no active one of that name; "
-            f"there are {', '.join(active)}"
-        )
-
     def keep_channel(settings: DaqcoSettings) -> None:
-        problem = _missing(settings)
+        problem = _missing(wanted, settings)
         if ends and problem:
             raise NotAvailable(f"{problem}. Stop steering first")
-        if problem and not _missing(daqco.settings):
+        if problem and not _missing(wanted, daqco.settings):
             logger.warning("%s; steering is refused until then", problem)
 
     daqco.before_change(keep_channel)
     return force
+
+
+def _missing(wanted: str, settings: DaqcoSettings) -> str:
+    """Return why the channel `wanted` gives no force; empty where it does, or none is wanted."""
+    if not wanted:
+        return ""
+    active = {each.name: each for each in settings.channel if each.active}
+    if wanted not in active:
+        return (
+            f"force feedback needs the channel {wanted}, and there is no active one of that name; "
+            f"there are {', '.join(active)}"
+        )
+    unit = settings.scales()[active[wanted].scale].unit
+    if unit not in MICRONEWTONS:
+        units = ", ".join(MICRONEWTONS)
+        return f"force feedback needs the channel {wanted} in one of {units}; it is in {unit}"
+    return ""

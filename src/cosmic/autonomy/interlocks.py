@@ -18,7 +18,7 @@ from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.mico.hw.interface import PositionerKind
 from cosmic.vico.api.application import VicoApplication
 
-_UN: Final = {"nN": 1e-3, "uN": 1.0, "µN": 1.0, "mN": 1e3, "N": 1e6}
+MICRONEWTONS: Final = {"nN": 1e-3, "uN": 1.0, "µN": 1.0, "mN": 1e3, "N": 1e6}
 """How many micronewtons a unit of force is."""
 TOUCH_S: Final = 0.02
 """Over so long a force is averaged, so that noise is no touch."""
@@ -87,7 +87,7 @@ class TouchWatch:
         least_un = self._mico.manager.settings.undo.felt_un
         felt: list[str] = []
         for name, scale, mean in zip(chunk.channels, chunk.scales, self._means, strict=True):
-            force_un = abs(mean) * _UN.get(scale.unit, 0.0)
+            force_un = abs(mean) * MICRONEWTONS.get(scale.unit, 0.0)
             if force_un <= least_un:
                 continue
             felt.append(f"{name} feels {mean:.1f} {scale.unit}")

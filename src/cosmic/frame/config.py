@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 from cosmic.frame.errors import ConfigError
+from cosmic.frame.kept_file import open_file
 
 M = TypeVar("M", bound="StrictModel")
 
@@ -64,7 +65,7 @@ def read_toml(path: Path) -> dict[str, object]:
         The file is missing, not readable, not UTF-8 or not TOML; the text says which and where.
     """
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             return tomllib.load(file)
     except FileNotFoundError:
         raise ConfigError(f"{path}: there is no such file") from None

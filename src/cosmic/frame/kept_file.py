@@ -8,13 +8,27 @@ from collections.abc import Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final
 
 import tomlkit
 from tomlkit.items import Item
 
 PART: Final = ".part"
 """What follows the name of a file while it is written."""
+
+
+def open_file(path: Path) -> BinaryIO:
+    """Open a file to be read.
+
+    Raises
+    ------
+    OSError
+        It cannot be opened, or is a pipe or a device: reading one may wait, or go on, for ever.
+    """
+    mode = path.stat().st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise OSError(errno.EINVAL, "it is a pipe or a device, no file", str(path))
+    return path.open("rb")
 
 
 def write_whole(path: Path, content: str | bytes) -> None:

@@ -22,9 +22,9 @@ SETTINGS = TeleoperationSettings(
 )
 
 
-def chunk(force_un: float, name: str = "force") -> DataChunk:
+def chunk(force_un: float, name: str = "force", unit: str = "uN") -> DataChunk:
     volts = np.full((2, 5), force_un)
-    same = Scale(name="same", unit="uN", coefficients=(0.0, 1.0))
+    same = Scale(name="same", unit=unit, coefficients=(0.0, 1.0))
     return DataChunk(0, 0.0, 1000.0, ("aux", name), volts, (same, same))
 
 
@@ -73,6 +73,21 @@ def test_a_force_that_is_no_number_is_not_felt_and_lets_nothing_go_on(wall):
     felt = Felt()
     assert felt.under(math.nan, x=1.0) == {"x": 0.0}
     assert felt.forces == [{"y": 0.0}]
+
+
+def test_a_force_in_another_unit_is_the_same_force(wall):
+    felt = Felt()
+    felt.force.take(chunk(0.1, unit="mN"))
+    assert felt.force.force_un == pytest.approx(100.0)
+    assert felt.forces == [{"y": pytest.approx(1.0)}]
+    assert felt.force.slow_down({"y": 10.0}) == {"y": pytest.approx(5.0)}
+
+
+def test_what_is_measured_as_no_force_is_not_felt_and_lets_nothing_go_on(wall):
+    felt = Felt()
+    felt.force.take(chunk(0.0, unit="V"))
+    assert felt.forces == [{"y": 0.0}]
+    assert felt.force.slow_down({"y": 10.0}) == {"y": 0.0}
 
 
 def test_another_channel_is_not_felt(wall):

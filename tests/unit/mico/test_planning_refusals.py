@@ -114,6 +114,13 @@ def test_numbers_that_are_none_are_refused(wrong: float) -> None:
         assert caught.value.verdict.reason is Reason.NOT_FINITE
 
 
+@pytest.mark.parametrize("budget_s", [0.0, -1.0, 3600.1, 1e9])
+def test_a_time_that_nobody_waits_is_refused(budget_s: float) -> None:
+    problem = Problem(at(), {"left.x": 100.0}, LIMITS, budget_s=budget_s)
+    with pytest.raises(MoveRefused, match="no time to plan a path in; give up to 3600 s"):
+        plan_path(Sweep(arms()), problem)
+
+
 def test_limits_that_are_no_numbers_are_refused() -> None:
     for low, high in ((math.nan, 100.0), (-100.0, math.nan), (100.0, -100.0)):
         with pytest.raises(LimitError):

@@ -46,6 +46,25 @@ def test_a_profile_taken_back_leaves_the_file_without_it(tmp_path):
     assert ProfileBook(SETTINGS, tmp_path / "profiles.toml")[LEFT] == SETTINGS.profile[0]
 
 
+def test_what_another_program_changed_meanwhile_stays(tmp_path):
+    path = tmp_path / "profiles.toml"
+    book = ProfileBook(SETTINGS, path)
+    left = changed(path)
+    other = book.edited("other", {"fine_share": 0.5})
+    book.put(other)
+    again = ProfileBook(SETTINGS, path)
+    assert (again[LEFT], again["other"]) == (left, other)
+
+
+def test_a_file_that_became_wrong_meanwhile_stays(tmp_path):
+    path = tmp_path / "profiles.toml"
+    book = ProfileBook(SETTINGS, path)
+    path.write_text("[[profile", encoding="utf-8")
+    book.put(book.edited("other", {"fine_share": 0.5}))
+    assert path.read_text(encoding="utf-8") == "[[profile"
+    assert book.path is None
+
+
 def test_a_file_that_cannot_be_written_costs_nothing_but_the_file(tmp_path):
     book = ProfileBook(SETTINGS, tmp_path / "missing" / "profiles.toml")
     profile = book.edited(LEFT, {"fine_share": 0.5})

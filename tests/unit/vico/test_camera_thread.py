@@ -5,6 +5,7 @@ import logging
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from contract.station_rig import wait_until
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.heartbeat import STALL_S
 from cosmic.testing.cameras import CameraContract
 from cosmic.vico.core.camera_thread import CameraThread
 from cosmic.vico.core.image import CameraImage, Circumstances
@@ -187,3 +189,50 @@ def test_an_image_of_no_time_or_of_the_future_is_refused_with_the_reason(
         bench.thread.next_image(WALL.now_s(), 0.1)
     bench.camera.ahead_s = 0.0
     assert wait_until(lambda: not bench.thread.problem)
+
+
+@pytest.mark.parametrize("method", ["_fetch", "_begin", "_end"])
+def test_a_driver_that_hangs_is_named_and_nobody_waits_for_it(
+    method: str, bench: Bench, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hung, released = Event(), Event()
+    whole = getattr(bench.camera, method)
+
+    def hangs(*arguments: object) -> object:
+        hung.set()
+        released.wait(10.0)
+        return whole(*arguments)
+
+    monkeypatch.setattr(bench.camera, method, hangs)
+    thread = bench.thread
+    if method != "_fetch":
+        thread.stop_images()
+        thread.start_images()
+    try:
+        assert hung.wait(5.0)
+        waiting = thread.configure(bench.camera.settings)
+        thread.heartbeat.look(0.5)
+        assert not thread.problem
+        thread.heartbeat.look(STALL_S)
+        assert "Microscope: its driver has not returned from a call for 5 s" in thread.problem
+        assert not thread.running
+        for task in (waiting, thread.stop_images()):
+            with pytest.raises(NotAvailable, match=r"does not return|has not returned"):
+                task.wait(1.0)
+        with pytest.raises(NotAvailable, match="has not returned"):
+            thread.next_image(WALL.now_s(), 0.1)
+        thread.heartbeat.look(STALL_S)
+    finally:
+        released.set()
+    assert wait_until(lambda: thread.heartbeat.look(0.0) or not thread.problem)
+    thread.start_images().wait(5.0)
+    assert thread.next_image(WALL.now_s(), 5.0) is not None
+    assert len([each for each in caplog.records if each.levelno >= logging.ERROR]) == 1
+
+
+def test_a_camera_that_gives_nothing_and_returns_does_not_hang(bench: Bench) -> None:
+    bench.thread.stop_images().wait(5.0)
+    for _ in range(20):
+        WALL.sleep(0.06)
+        bench.thread.heartbeat.look(STALL_S)
+        assert not bench.thread.problem

@@ -1,6 +1,7 @@
 """The thread of lens and light: commands, what it publishes, and what happens when a line fails."""
 
 from collections.abc import Callable, Iterator
+from threading import Event
 
 import pytest
 from PySide6.QtCore import Qt
@@ -18,12 +19,14 @@ from cosmic.frame.errors import (
     NotConnectedError,
 )
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.heartbeat import STALL_S
 from cosmic.frame.network.caller import Call, Caller, carrying_out
 from cosmic.frame.network.dead_man import DeadMan, Pulse
 from cosmic.frame.operation import Task
 from cosmic.vico.core.lens_control import PeripheralThread
 from cosmic.vico.hw.factory import make_lens, make_light
-from cosmic.vico.hw.peripherals import LensAxis
+from cosmic.vico.hw.navitar import NavitarLens
+from cosmic.vico.hw.peripherals import LensAxis, LensState
 from cosmic.vico.hw.sim_peripherals import SimPeripherals
 from system.simulated_platform import wait_until
 
@@ -318,3 +321,33 @@ def test_a_remote_movement_stops_when_whoever_commanded_it_is_gone(make: Make) -
     with carrying_out(Call(Caller("vision", "secret"), DeadMan(pulse, 5.0))):
         assert "not started: vision is gone" in str(failure(bench.thread.home()))
     assert not bench.thread.state.moving
+
+
+def test_a_line_that_hangs_is_named_and_nobody_waits_for_it(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench, hung, released = make().start(), Event(), Event()
+    whole = NavitarLens.state
+
+    def hangs(lens: NavitarLens, axis: LensAxis) -> LensState:
+        hung.set()
+        released.wait(10.0)
+        return whole(lens, axis)
+
+    monkeypatch.setattr(NavitarLens, "state", hangs)
+    thread = bench.thread
+    under_way, waiting = thread.home(), thread.set_light(20.0)
+    try:
+        assert hung.wait(5.0)
+        thread.heartbeat.look(0.5)
+        thread.heartbeat.look(STALL_S)
+        for task in (under_way, waiting, thread.home()):
+            assert "a driver has not returned from a call for 5 s" in str(failure(task))
+        state = thread.state
+        assert state.zoom is state.focus is state.light_percent is None
+        assert "whether the lens moves is unknown" in state.lens_problem
+    finally:
+        released.set()
+    wait_until(lambda: thread.heartbeat.look(0.0) or not thread.state.lens_problem)
+    assert thread.set_light(30.0).wait(5.0) is None
+    assert thread.state.zoom is not None

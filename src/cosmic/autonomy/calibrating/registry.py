@@ -1,6 +1,7 @@
 """`CalibrationRegistry`: what was measured, how well, when, with what, and whether it holds."""
 
 import logging
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -178,14 +179,14 @@ class CalibrationRegistry:
     session: str = field(default_factory=lambda: uuid4().hex[:12])
     focus_before: int | None = None
     _known: dict[tuple[str, str], CalibrationEntry] = field(default_factory=dict)
+    _kept: dict[tuple[str, str], CalibrationEntry] = field(default_factory=dict)
     _lock: Lock = field(default_factory=Lock)
+    _writing: Lock = field(default_factory=Lock)
     _changed: Event[[]] = field(default_factory=Event)
 
     def __post_init__(self) -> None:
-        if self.folder is not None and (self.folder / FILE).exists():
-            for each in _read(self.folder / FILE):
-                entry = CalibrationEntry(**each)
-                self._known[entry.key] = entry
+        self._kept = self._in_file()
+        self._known = dict(self._kept)
 
     @property
     def entries(self) -> tuple[CalibrationEntry, ...]:
@@ -200,14 +201,28 @@ class CalibrationRegistry:
         return None if found is None or found.problem else found
 
     def put(self, entry: CalibrationEntry) -> None:
-        """Put one in force, and keep it; raises `ConfigError` where it cannot be written."""
+        """Put one in force, and keep it.
+
+        Raises
+        ------
+        ConfigError
+            It cannot be written, or holds what is no number: then all stays as it was.
+        """
+        numbers = {**entry.values, "residual": entry.residual, "largest": entry.largest}
+        wrong = [name for name, value in numbers.items() if not math.isfinite(value)]
+        if wrong:
+            names = ", ".join(wrong)
+            raise ConfigError(f"{entry.name} of {entry.tool}: {names}: no number; measure it again")
         with self._lock:
             self._known[entry.key] = replace(entry, session=self.session, version=self.version)
-        self._write()
+        self._write(entry.key)
 
     def refuse(self, entry: CalibrationEntry, problem: str) -> None:
         """Note that one was refused; what was in force before is none any more."""
-        self.put(replace(entry, problem=problem))
+        # What is no number cannot be kept; `problem` says it.
+        values = {name: value for name, value in entry.values.items() if math.isfinite(value)}
+        residual = entry.residual if math.isfinite(entry.residual) else 0.0
+        self.put(replace(entry, values=values, residual=residual, problem=problem))
 
     def confirm(self, entry: CalibrationEntry, now_s: float) -> CalibrationEntry:
         """Note that one was looked at and holds, and return it as it stands now."""
@@ -220,7 +235,7 @@ class CalibrationRegistry:
         """Have one measured anew; harmless where there is none."""
         with self._lock:
             self._known.pop((name, tool), None)
-        self._write()
+        self._write((name, tool))
 
     def age_s(self, entry: CalibrationEntry) -> float:
         """Return how long ago one was made: on the platform's clock, or by date if before it."""
@@ -246,10 +261,35 @@ class CalibrationRegistry:
         """Call `listener()`, in any thread, after each change; returns what ends it."""
         return self._changed.subscribe(listener)
 
-    def _write(self) -> None:
+    def _in_file(self) -> dict[tuple[str, str], CalibrationEntry]:
+        """Return what the file holds; empty without one."""
+        if self.folder is None or not (self.folder / FILE).exists():
+            return {}
+        found = [CalibrationEntry(**each) for each in _read(self.folder / FILE)]
+        return {each.key: each for each in found}
+
+    def _write(self, changed: tuple[str, str]) -> None:
+        """Write what became of one; what others did to the file meanwhile stays."""
         if self.folder is not None:
-            fields = CalibrationEntry.__slots__
-            rows = [{name: getattr(each, name) for name in fields} for each in self.entries]
-            _write_file(self.folder / FILE, rows)
+            with self._writing:
+                if (self.folder / FILE).exists():
+                    self._take_over(self._in_file(), changed)
+                names = CalibrationEntry.__slots__
+                rows = [{name: getattr(each, name) for name in names} for each in self.entries]
+                _write_file(self.folder / FILE, rows)
+                self._kept = self._in_file()
             logger.info("%s written", self.folder / FILE)
         self._changed.emit()
+
+    def _take_over(
+        self, now: Mapping[tuple[str, str], CalibrationEntry], changed: tuple[str, str]
+    ) -> None:
+        """Take what another program, or a person, put into the file or took out of it."""
+        with self._lock:
+            for key in (self._kept.keys() | now.keys()) - {changed}:
+                if now.get(key) == self._kept.get(key):
+                    continue
+                if key in now:
+                    self._known[key] = now[key]
+                else:
+                    self._known.pop(key, None)

@@ -48,6 +48,8 @@ from cosmic.frame.config import check_model
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.version import __version__
 
+FITTED_SHA256: Final = "fitted_sha256"
+"""Under which name the record has the SHA-256 of the file of fitted curves."""
 SAME: Final = 1e-6
 """Of a value: what differs by less is the same number, rounded otherwise."""
 
@@ -253,8 +255,10 @@ def finish(store: CampaignStore, settings: AnalysisSettings | None = None) -> An
         number: [each.fitted_un for each in result.spans]
         for number, result in analysis.results.items()
     }
-    write_whole(store.folder / FINAL, fitted_file(fitted))
-    store.keep_analysis(analysis.results, analysis.as_json())
+    content = fitted_file(fitted)
+    write_whole(store.folder / FINAL, content)
+    kept = analysis.as_json() | {FITTED_SHA256: hashlib.sha256(content).hexdigest()}
+    store.keep_analysis(analysis.results, kept)
     return analysis
 
 
@@ -429,8 +433,8 @@ def _alike(one: object, other: object) -> bool:
 def altered_files(reader: CampaignReader) -> tuple[str, ...]:
     """Return what of a folder, beside raw curves, is not as it was written, in words.
 
-    These are images, what each run was made with, copies of the files of that, and raw files that
-    belong to no fibre of the record.
+    These are images, fitted curves, what each run was made with, copies of the files of that, and
+    raw files that belong to no fibre of the record.
 
     Raises
     ------
@@ -444,14 +448,17 @@ def altered_files(reader: CampaignReader) -> tuple[str, ...]:
         for path in sorted((reader.folder / FIBRES).glob("*.h5"))
         if path not in known
     ]
-    images = [
+    written = dict(reader.image_files())
+    if sha256 := reader.analysis().get(FITTED_SHA256):  # older records do not have it
+        written[FINAL] = str(sha256)
+    altered = [
         f"{file}: {'is missing' if not path.exists() else 'its SHA-256 differs'}"
-        for file, sha256 in reader.image_files().items()
+        for file, sha256 in written.items()
         if _digest(path := reader.folder / file) != sha256
     ]
     copies = [f"{each}: its copy differs or is missing" for each in changed_files(reader.folder)]
     records = changed_records(reader.folder, reader.run_records())
-    return (*strangers, *images, *records, *copies)
+    return (*strangers, *altered, *records, *copies)
 
 
 def _digest(path: Path) -> str:

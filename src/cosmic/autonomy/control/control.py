@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from threading import Lock
 
 from cosmic.autonomy.control.force_servo import ForceGoal, ForceServo
-from cosmic.autonomy.control.handle import ControlHandle, check_inside
+from cosmic.autonomy.control.handle import ControlHandle, check_inside, check_measurable
 from cosmic.autonomy.control.law import Law, PidLaw
 from cosmic.autonomy.control.loop import ControlLoop
 from cosmic.autonomy.control.parts import LoopParts
@@ -143,7 +143,7 @@ class Control:
         ConfigError, UnknownAxisError
             No such channel or axis, or numbers that make no sense.
         LimitError
-            The set point does not lie inside the limits.
+            The set point does not lie inside the limits, or inside what the channel can measure.
         NotAvailable
             Nothing is acquired, the axis moves, or a loop has it already.
         StoppedError
@@ -151,12 +151,13 @@ class Control:
         """
         parts = self._parts()
         parts.check_acquisition()
+        check_inside(channel, "uN", setpoint_un, (-math.inf, math.inf))
         settings = parts.settings(travel_um=travel_um, ramp_un_s=ramp_un_s)
         limits = parts.force_limits(channel, setpoint_un, limit_un)
-        goal = _force_goal(channel, setpoint_un, limits, direction, settings, tolerance_un)
         source = parts.channel(channel, settings, limits)
         if source.unit != "uN":
             raise ConfigError(f"{channel} is measured in {source.unit}; a force must be in uN")
+        goal = _force_goal(channel, setpoint_un, limits, direction, settings, tolerance_un)
         return self._begin(
             source,
             ForceServo(goal, settings, gains),
@@ -211,6 +212,9 @@ class Control:
             raise ConfigError(f"tolerance must be a number above 0, got {tolerance!r}")
         origin = parts.source(source, settings, limits)
         sink = AxisSink(self._mico, axis, speed=speed, travel=travel, interval_s=settings.latency_s)
+        if origin.name == sink.name and direction == -1:
+            text = "its own position rises while it moves forward; direction must be 1"
+            raise ConfigError(f"{sink.name}: {text}")
         law = PidLaw(
             set_point,
             gains,
@@ -224,7 +228,9 @@ class Control:
         )
 
     def stop(self) -> None:
-        """End all loops; each stops its axis. Returns at once."""
+        """End all loops; each stops its axis. One that just begins is waited for, and ended."""
+        for handle in self._all.by_axis.values():
+            handle.stop()
         for handle in self.loops:
             handle.stop()
 
@@ -256,6 +262,7 @@ class Control:
         tolerance: float,
         limits: tuple[float, float],
     ) -> ControlHandle:
+        check_measurable(source, set_point)
         loop = ControlLoop(source, law, sink, settings, rate=self._rate, policy=self._policy)
         handle = ControlHandle(
             loop,
@@ -275,7 +282,9 @@ class Control:
             if other is not None:
                 other.join()
             loop.begin()
-            self._all.by_axis[sink.name] = self._all.newest = handle
+            # A copy, so that whoever stops all loops waits for none that begins.
+            self._all.by_axis = {**self._all.by_axis, sink.name: handle}
+            self._all.newest = handle
         return handle
 
 

@@ -15,6 +15,7 @@ from cosmic.autonomy.control.loop import (
     ControlReading,
     ControlStatistics,
 )
+from cosmic.autonomy.control.sources import Source
 from cosmic.autonomy.control.trace import ControlTrace
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.clock import WALL
@@ -144,9 +145,10 @@ class ControlHandle:
         Raises
         ------
         LimitError
-            It does not lie inside the limits.
+            It does not lie inside the limits, or inside what the channel can measure.
         """
         check_inside(self.source, self.unit, set_point, self._limits)
+        check_measurable(self._loop.source, set_point)
         self._set_point = set_point
         self._loop.law.aim(set_point)
 
@@ -235,3 +237,16 @@ def check_inside(name: str, unit: str, value: float, limits: tuple[float, float]
     text = f"{name}: a set point of {value:g} {unit} does not lie inside {low:g} to {high:g}"
     limit = high if value >= high else low
     raise LimitError(refuse(Reason.LIMIT, text, value=value, limit=limit, unit=unit))
+
+
+def check_measurable(source: Source, value: float) -> None:
+    """Raise `LimitError` where a set point lies beyond what its source can measure."""
+    low, high = source.measurable
+    if low < value < high:
+        return
+    text = (
+        f"{source.name}: a set point of {value:g} {source.unit} cannot be held: it measures "
+        f"from {low:g} to {high:g} {source.unit}"
+    )
+    limit = high if value >= high else low
+    raise LimitError(refuse(Reason.LIMIT, text, value=value, limit=limit, unit=source.unit))

@@ -173,9 +173,13 @@ class ControlLoop(WorkerThread):
                 self.state = ControlState.ENDED
         if not first:
             return
-        self.sink.close(error)
-        self._end_requested.set()
-        self._timer.end()
+        try:
+            self.sink.close(error)
+        except CosmicError as exc:  # its station is lost: what it commands ends there by itself
+            logger.error("control loop: %s could not be stopped: %s", self.sink.name, exc)
+        finally:
+            self._end_requested.set()
+            self._timer.end()
         log = logger.info if error is None else logger.warning
         log("control loop: %s by %s ended: %s", self.source.name, self.sink.name, self.reason)
 
@@ -226,7 +230,9 @@ class ControlLoop(WorkerThread):
             self._cycle(passed_s)
 
     def _cycle(self, passed_s: float) -> None:
-        dt_s = passed_s * self._rate
+        # Speeds are such that what happens within the latency is safe: a cycle that comes later,
+        # for the computer stood still, makes up for nothing.
+        dt_s = min(passed_s * self._rate, self._settings.latency_s)
         sample = self._fresh()
         if sample is None or WALL.now_s() - sample.read_wall_s > self.source.pause_s:
             self.sink.brake(dt_s)

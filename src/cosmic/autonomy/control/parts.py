@@ -9,6 +9,7 @@ from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.autonomy.control.sink import AxisSink
 from cosmic.autonomy.control.sources import ChannelSource, PositionSource, Source
 from cosmic.daqco.api.daqco import Daqco
+from cosmic.daqco.core.guarded import measurable
 from cosmic.frame.config import wrong_values
 from cosmic.frame.errors import ConfigError, NotAvailable, UnknownAxisError
 from cosmic.mico.api.mico import Mico
@@ -106,13 +107,20 @@ class LoopParts:
         self, channel: str, set_point: float, limit_un: float | None
     ) -> tuple[float, float]:
         """Return the least and the most force that a loop goes on with."""
+        daqco = self._acquisition()
+        least, most = measurable(channel, daqco.settings)
         if limit_un is not None:
             if not 0.0 < limit_un < math.inf:
                 raise ConfigError(f"limit_un must be a number above 0, got {limit_un!r}")
+            if not limit_un <= (most if set_point >= 0.0 else -least):
+                raise ConfigError(
+                    f"{channel}: a limit of {limit_un:g} uN can never be crossed: the channel "
+                    f"measures from {least:g} to {most:g} uN; give a lower limit_un"
+                )
             return -limit_un, limit_un
         beyond = max(LEAST_MARGIN_UN, MARGIN * abs(set_point))
         low, high = min(set_point, 0.0) - beyond, max(set_point, 0.0) + beyond
-        daqco = self._acquisition()
+        low, high = max(low, least), min(high, most)
         for each in daqco.settings.limit:
             if each.channel == channel:
                 low = max(low, each.low) if each.low is not None else low

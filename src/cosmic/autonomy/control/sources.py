@@ -12,6 +12,7 @@ from typing_extensions import override
 
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.core.chunk import DataChunk
+from cosmic.daqco.core.guarded import changed_quantity, measurable
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ConfigError, CosmicError, LimitError, NotAvailable
 from cosmic.frame.verdict import Reason, refuse
@@ -76,6 +77,11 @@ class Source(Protocol):
 
     @property
     @abstractmethod
+    def measurable(self) -> tuple[float, float]:
+        """The least and the most that can be measured; only what lies between can be held."""
+
+    @property
+    @abstractmethod
     def stale_s(self) -> float:
         """How old a value may be, wall time, before the loop ends."""
 
@@ -123,6 +129,8 @@ class ChannelSource(Source):
         self._daqco = daqco
         self._channel = channel
         self._unit = daqco.units[channel]
+        # Values by another scale, or of another input, are not of the quantity that is held.
+        self._settings = daqco.settings
         self._stale_s, self._pause_s = stale_s, min(pause_s, stale_s)
         self._limits = Limits(channel, self._unit, low, high)
         self._newest: Sample | None = None
@@ -138,6 +146,11 @@ class ChannelSource(Source):
     @override
     def unit(self) -> str:
         return self._unit
+
+    @property
+    @override
+    def measurable(self) -> tuple[float, float]:
+        return measurable(self._channel, self._settings)
 
     @property
     @override
@@ -169,18 +182,29 @@ class ChannelSource(Source):
 
     def _on_chunk(self, chunk: DataChunk) -> None:
         """Take a chunk; acquisition thread."""
-        if self._channel not in chunk.channels:
-            gone = f"there is no channel {self._channel} any more: renamed, or switched off"
-            self._report(ConfigError(f"{gone}; start the loop again with an existing channel"))
+        if (changed := self._changed(chunk)) is not None:
+            self._report(ConfigError(f"{changed}; begin the loop again"))
             return
         row = chunk.channels.index(self._channel)
-        if chunk.scales[row].unit != self._unit:
-            self._report(ConfigError(f"{self._channel} is no longer measured in {self._unit}"))
-            return
         values = chunk.scales[row].apply(chunk.volts[row])
         self._newest = Sample(float(values[-1]), WALL.now_s())
         if (crossed := self._limits.crossed(values)) is not None:
             self._report(crossed)
+
+    def _changed(self, chunk: DataChunk) -> str | None:
+        """Return what is no longer as when the loop was made; None where all is."""
+        begun, now = self._settings, self._daqco.settings
+        name = self._channel
+        if now is not begun:
+            if changed := changed_quantity(name, begun, now):
+                return changed
+            self._settings = now  # of the same quantity: it is compared once
+        if name not in chunk.channels:
+            return f"there is no channel {name} any more: renamed, or switched off"
+        scale = chunk.scales[chunk.channels.index(name)]
+        if scale.unit != self._unit:
+            return f"{name} is no longer measured in {self._unit}"
+        return None
 
     def _report(self, error: CosmicError) -> None:
         if self._on_limit is not None:
@@ -220,6 +244,11 @@ class PositionSource(Source):
     @override
     def unit(self) -> str:
         return self._axis.unit
+
+    @property
+    @override
+    def measurable(self) -> tuple[float, float]:
+        return -math.inf, math.inf
 
     @property
     @override

@@ -396,6 +396,9 @@ class DaqcoApplication(TaskApplication):
             ended = core.join(BRIEFLY_S) if core.given_up else core.join()
             if not ended:
                 self._hung = core
+                if not core.given_up:
+                    boards = ", ".join(core.plan.boards)
+                    logger.error("%s: stop does not return; check cable and driver", boards)
 
     def _check_hung(self) -> None:
         """Raise while a board has not returned from an acquisition that was given up."""
@@ -403,9 +406,10 @@ class DaqcoApplication(TaskApplication):
         if core is not None and not core.join(BRIEFLY_S):
             self._hung = core
             asked = core.asked
+            whom, call = (asked[0], "receive") if asked else (", ".join(core.plan.boards), "stop")
             raise DeviceTimeout(
-                f"{asked[0] if asked else 'a board'}: receive still has not returned, and two "
-                f"threads cannot read one board. Check its cable and its driver, then start again",
+                f"{whom}: {call} still has not returned, and two threads cannot use one board. "
+                f"Check its cable and its driver, then start again",
                 fault=DeviceFault.TIMEOUT,
             )
 
@@ -605,5 +609,6 @@ class DaqcoApplication(TaskApplication):
         self._silence.join()
         self.stop_acquisition()
         with self._lock:
-            self._close_boards()
+            if self._hung is None:  # closing it would hang as well
+                self._close_boards()
         self.join()

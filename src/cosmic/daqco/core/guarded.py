@@ -22,6 +22,14 @@ def _channel(name: str, settings: DaqcoSettings) -> ChannelSettings | None:
     return next((each for each in settings.channel if each.name == name), None)
 
 
+def _active(name: str, settings: DaqcoSettings) -> ChannelSettings:
+    channel = _channel(name, settings)
+    if channel is None or not channel.active:
+        names = ", ".join(each.name for each in settings.channel if each.active)
+        raise ConfigError(f"there is no active channel {name!r}; there are {names}")
+    return channel
+
+
 def _scale(channel: ChannelSettings, settings: DaqcoSettings) -> Scale:
     return settings.scales()[channel.scale]
 
@@ -47,24 +55,57 @@ def check_arming(limit: Limit, settings: DaqcoSettings) -> None:
     NotAvailable
         Chunks are too long for the watch.
     """
-    channel = _channel(limit.channel, settings)
-    if channel is None or not channel.active:
-        names = ", ".join(each.name for each in settings.channel if each.active)
-        raise ConfigError(f"there is no active channel {limit.channel!r}; there are {names}")
+    channel = _active(limit.channel, settings)
     if settings.chunk_s * CHUNKS_A_SILENCE > settings.silence_s:
         raise NotAvailable(
             f"{limit.channel}: its limit cannot be watched: data come every {settings.chunk_s:g} s "
             f"and are missed after {settings.silence_s:g} s; shorten chunk_s"
         )
     scale = _scale(channel, settings)
-    values = scale.apply(np.linspace(channel.low_v, channel.high_v, _VOLTAGES))
-    low, high = float(values.min()), float(values.max())
+    low, high = measurable(channel.name, settings)
     if not (limit.low >= low or limit.high <= high):
         raise ConfigError(
             f"{limit.channel}: a limit of {limit.range_text} {scale.unit} can never be crossed: "
             f"{channel.low_v:g} to {channel.high_v:g} V are {low:g} to {high:g} {scale.unit} by "
             f"the scale {scale.name!r}; correct the limit, the range or the scale"
         )
+
+
+def measurable(name: str, settings: DaqcoSettings) -> tuple[float, float]:
+    """Return the least and the most that an active channel can measure, in its unit.
+
+    Raises
+    ------
+    ConfigError
+        There is no such channel, or it is not active.
+    """
+    channel = _active(name, settings)
+    volts = np.linspace(channel.low_v, channel.high_v, _VOLTAGES)
+    values = _scale(channel, settings).apply(volts)
+    return float(values.min()), float(values.max())
+
+
+def changed_quantity(name: str, before: DaqcoSettings, after: DaqcoSettings) -> str:
+    """Return what changed of the quantity that an active channel measures, in words; or ""."""
+    old, new = _channel(name, before), _channel(name, after)
+    if old is None or new is None or not new.active:
+        return f"there is no channel {name} any more: renamed, or switched off"
+    what = _changed(old, new, before, after)
+    return what and f"the {what} of {name} changed"
+
+
+def _changed(
+    old: ChannelSettings, new: ChannelSettings, before: DaqcoSettings, after: DaqcoSettings
+) -> str:
+    """Return what is different about the quantity that two channels measure; empty for nothing."""
+    if (old.board, old.input, old.mode) != (new.board, new.input, new.mode):
+        return "input"
+    if (old.low_v, old.high_v) != (new.low_v, new.high_v):
+        return "range"
+    one, other = _scale(old, before), _scale(new, after)
+    if one.unit != other.unit:
+        return "unit"
+    return "" if one.coefficients == other.coefficients else "scale"
 
 
 def check_guarded(limit: Limit, before: DaqcoSettings, after: DaqcoSettings) -> None:
@@ -94,14 +135,11 @@ def _touched(old: ChannelSettings, before: DaqcoSettings, after: DaqcoSettings) 
         return f"it cannot be renamed to {heir.name}" if heir else "it cannot be taken out"
     if not new.active:
         return "it cannot be switched off"
-    if (old.board, old.input, old.mode) != (new.board, new.input, new.mode):
-        return "its input cannot change"
-    if (old.low_v, old.high_v) != (new.low_v, new.high_v):
-        return "its range cannot change"
-    one, other = _scale(old, before), _scale(new, after)
-    if one.unit != other.unit:
+    what = _changed(old, new, before, after)
+    if what == "unit":
+        one, other = _scale(old, before), _scale(new, after)
         return f"its unit cannot change from {one.unit} to {other.unit}"
-    return "" if one.coefficients == other.coefficients else "its scale cannot change"
+    return what and f"its {what} cannot change"
 
 
 def _slowed(before: DaqcoSettings, after: DaqcoSettings) -> str:

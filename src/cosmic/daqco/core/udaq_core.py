@@ -149,6 +149,7 @@ class UDaqCore(WorkerThread):
             else:
                 self.failed.emit(exc)
         finally:
+            # Here alone: who asked for the end, a window perhaps, must not hang in a driver's stop.
             self._boards.stop()
 
     def _scaled(self, chunk: BoardChunk) -> DataChunk:
@@ -166,11 +167,6 @@ class UDaqCore(WorkerThread):
         """Expect nothing more, for a board hangs; returns at once, whatever the board does."""
         self._given_up = True
         self._end_requested.set()
-
-    @override
-    def request_end(self) -> None:
-        super().request_end()
-        self._boards.stop()
 
 
 class _Silence:

@@ -4,7 +4,9 @@ import logging
 import math
 import re
 import reprlib
+import tomllib
 from collections.abc import Mapping, MutableMapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import RLock
@@ -115,7 +117,7 @@ class PoseBook:
         try:
             text = path.read_text(encoding="utf-8") if path.exists() else HEAD
             write_whole(path, _replaced(text, name, self._poses.get(name)))
-        except (OSError, UnicodeDecodeError, TOMLKitError) as exc:
+        except (OSError, ValueError, RecursionError) as exc:
             self._path = None
             logger.warning("%s cannot be written (%s): poses are kept in memory only", path, exc)
 
@@ -170,7 +172,34 @@ def _misfit(axis: str, kinds: Mapping[str, str]) -> str:
 
 
 def _replaced(text: str, name: str, pose: Pose | None) -> str:
-    """Return `text` with the section of one pose replaced, added, or taken out."""
+    """Return `text` with the section of one pose replaced, added, or taken out.
+
+    Raises
+    ------
+    ValueError
+        It is no TOML, or written in such a way that one pose cannot be changed alone.
+    """
+    wanted = {other: each for other, each in tomllib.loads(text).items() if other != name}
+    if pose is not None:
+        wanted[name] = {axis: round(value, 4) for axis, value in pose.positions.items()}
+    for edit in (_edited, _written_anew):
+        # tomlkit fails in ways of its own at keys with dots, or says something else than it was to.
+        with suppress(TOMLKitError, LookupError, tomllib.TOMLDecodeError):
+            changed = edit(text, name, pose)
+            if tomllib.loads(changed) == wanted:
+                return changed
+    raise ValueError(f"the pose {name} is written in a way that cannot be changed alone")
+
+
+def _written_anew(text: str, name: str, pose: Pose | None) -> str:
+    """Return `text` with the pose taken out where it was, and written at the end."""
+    document = tomlkit.parse(text)
+    document.remove(name)
+    return _edited(tomlkit.dumps(document), name, pose)
+
+
+def _edited(text: str, name: str, pose: Pose | None) -> str:
+    """Return `text` with the section of one pose changed where it is."""
     document = tomlkit.parse(text)
     section = document.get(name)
     rest = _cut_tail(section) if isinstance(section, Table) else ""

@@ -16,6 +16,7 @@ from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, ui_font
+from cosmic.frame.kept_file import open_file
 from cosmic.frame.operation import Task
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.trajectories import Trajectories
@@ -371,7 +372,7 @@ def _recording_text(recording: TrajectoryRecording) -> str:
 def _lines_of(path: Path) -> list[str]:
     """Return what can be shown of a file that is no trajectory."""
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             data = file.read(LARGEST_BYTES)
     except OSError:
         return []

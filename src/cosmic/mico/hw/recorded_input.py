@@ -11,6 +11,7 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import ConfigError, NotConnectedError
+from cosmic.frame.kept_file import open_file
 from cosmic.frame.plugins import NoOptions
 from cosmic.mico.hw.input_device import (
     ALWAYS_REPORTS_S,
@@ -53,7 +54,8 @@ def read_events(path: Path) -> tuple[InputEvent, ...]:
         It cannot be read, or a line is not what it must be; the text names file and line.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        with open_file(path) as file:
+            text = file.read().decode("utf-8")
     except (OSError, UnicodeDecodeError) as exc:
         raise ConfigError(f"{path}: cannot be read: {exc}") from exc
     if "\0" in text:

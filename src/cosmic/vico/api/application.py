@@ -11,6 +11,7 @@ from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.heartbeat import HeartbeatWatch
 from cosmic.frame.operation import Task
 from cosmic.frame.task_application import TaskApplication
 from cosmic.vico.api.coordinate_transform import CoordinateTransform
@@ -84,6 +85,11 @@ class VicoApplication(TaskApplication):
             )
             for config in settings.camera
         }
+        self._watch = HeartbeatWatch(
+            "driver watch",
+            [self.peripherals.heartbeat, *(each.thread.heartbeat for each in self.units.values())],
+            policy,
+        )
         direct = Qt.ConnectionType.DirectConnection
         self.peripherals.state_changed.connect(self._on_state_changed, direct)
         for unit in self.units.values():
@@ -96,6 +102,7 @@ class VicoApplication(TaskApplication):
     def initialize(self) -> None:
         """Begin to look for everything; nothing is waited for, and what is missing is told."""
         self.start()
+        self._watch.start()
         self.peripherals.start()
         for unit in self.units.values():
             unit.start()
@@ -107,10 +114,13 @@ class VicoApplication(TaskApplication):
         for unit in self.units.values():
             unit.request_end()
         self.peripherals.request_end()
-        for unit in self.units.values():
-            unit.join()
-        self.peripherals.join()
-        self.libraries.close()
+        self._watch.request_end()
+        ended = [unit.join() for unit in self.units.values()]
+        if not self.peripherals.join():
+            logger.error("lens and light: a driver does not return; it is left behind")
+        if all(ended):
+            self.libraries.close()
+        self._watch.join()
         self.join()
 
     def rescan(self) -> Task:

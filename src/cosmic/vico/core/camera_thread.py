@@ -23,6 +23,7 @@ from cosmic.frame.errors import (
 )
 from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.heartbeat import OPEN_S, Heartbeat
 from cosmic.frame.operation import Task
 from cosmic.frame.threads import WorkerThread, forbid_waiting_here
 from cosmic.vico.core.image import CameraImage, Circumstances
@@ -91,7 +92,12 @@ class CameraThread(WorkerThread):
     Signals
     -------
     status_changed()
-        Connected, lost, started, stopped or configured.
+        Connected, lost, started, stopped or configured; its driver hangs, or goes on.
+
+    Attributes
+    ----------
+    heartbeat : Heartbeat
+        Stays away while a call of the driver does not return.
     """
 
     may_wait = False
@@ -132,6 +138,8 @@ class CameraThread(WorkerThread):
         self._ended: Event[[]] = Event()
         self._lock = Lock()
         self._over = False
+        self._stall = ""
+        self.heartbeat = Heartbeat(self._on_stall)
 
     # What there is; any thread
 
@@ -160,12 +168,12 @@ class CameraThread(WorkerThread):
     @property
     def running(self) -> bool:
         """It takes images, or waits for its trigger."""
-        return self._running
+        return self._running and not self._stall
 
     @property
     def problem(self) -> str:
         """Why no images come; empty when all is well."""
-        return self._problem
+        return self._stall or self._problem
 
     @property
     def newest(self) -> CameraImage | None:
@@ -218,7 +226,7 @@ class CameraThread(WorkerThread):
             newest = self._newest
         if newest is None or not fresh():
             self._check_open()
-            reason = self._problem or ("it is stopped" if not self._running else "none arrived")
+            reason = self.problem or ("it is stopped" if not self._running else "none arrived")
             raise NotAvailable(f"no image of {self.camera_name} in {timeout_s:g} s: {reason}")
         return newest
 
@@ -276,7 +284,7 @@ class CameraThread(WorkerThread):
         self._check_open()
         camera = self._camera
         if camera is None:
-            raise NotAvailable(f"{self.camera_name}: {self._problem or 'not connected'}")
+            raise NotAvailable(f"{self.camera_name}: {self.problem or 'not connected'}")
         camera.trigger()
 
     def _check_open(self) -> None:
@@ -288,6 +296,8 @@ class CameraThread(WorkerThread):
         with self._lock:
             if self._over:
                 task.fail(NotAvailable(f"{self.camera_name} is closed"))
+            elif self._stall:
+                task.fail(NotAvailable(self._stall))
             else:
                 self._commands.put((task, command))
         return task
@@ -304,6 +314,7 @@ class CameraThread(WorkerThread):
                     self._lose(exc)
         finally:
             self._close()
+            self.heartbeat.end()
             with self._lock:
                 self._over = True
             self._refuse_commands("closed")
@@ -314,6 +325,7 @@ class CameraThread(WorkerThread):
     def _work(self) -> None:
         """Open the camera and take images until the end, another camera or a failure."""
         self._reopen = False
+        self.heartbeat.beat(OPEN_S)
         self._close()
         with only_cosmic_errors(self.camera_name):
             self._camera = camera = self._open_camera()
@@ -325,6 +337,7 @@ class CameraThread(WorkerThread):
         self._problem = ""
         self.status_changed.emit()
         while not (self.end_requested or self._reopen):
+            self.heartbeat.beat()
             self._obey(camera)
             if not self._running:
                 self._end_requested.wait(LOOK_S)
@@ -454,8 +467,28 @@ class CameraThread(WorkerThread):
         self.status_changed.emit()
         until_s = WALL.now_s() + SEARCH_S
         while not (self.end_requested or self._reopen) and WALL.now_s() < until_s:
+            self.heartbeat.beat()
             self._end_requested.wait(LOOK_S)
             self._refuse_commands(text)
+
+    def _on_stall(self, stalled_s: float) -> None:
+        """Say that the driver hangs, or that it goes on; thread of the watch."""
+        before = self._stall
+        if stalled_s:
+            what = "the image shown is an old one" if self._running else "no images come"
+            text = (
+                f"{self.camera_name}: its driver has not returned from a call for {stalled_s:g} s; "
+                f"{what}. Unplug the camera and plug it in again, or restart the program"
+            )
+            with self._lock:
+                self._stall = text
+            logger.error("%s", text)
+            self._refuse_commands("its driver does not return")
+        elif before:
+            with self._lock:
+                self._stall = ""
+            logger.warning("%s: its driver has returned, and goes on", self.camera_name)
+        self.status_changed.emit()
 
     def _refuse_commands(self, reason: str) -> None:
         while not self._commands.empty():

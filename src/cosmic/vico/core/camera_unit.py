@@ -173,13 +173,16 @@ class CameraUnit:
         self.thread.request_end()
         self.vision.request_end()
 
-    def join(self) -> None:
-        """Wait until everything has ended."""
+    def join(self) -> bool:
+        """Wait until everything has ended; False where the driver of the camera did not return."""
         self.recordings.stop()
-        self.thread.join()
+        ended = self.thread.join()
+        if not ended:
+            logger.error("%s: its driver does not return; it is left behind", self._config.name)
         self.jobs.join()
         self.live.join()
         self.vision.join(VISION_JOIN_WALL_S)
+        return ended
 
     def _collect(self, image: CameraImage) -> None:
         """Give the background what it waits for; in the camera's thread."""

@@ -1,5 +1,6 @@
 """`PeripheralThread`: lens and light, each at the end of its line, in a thread of their own."""
 
+import logging
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -12,6 +13,7 @@ from typing_extensions import override
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.heartbeat import OPEN_S, Heartbeat
 from cosmic.frame.network.caller import current_call
 from cosmic.frame.operation import Task
 from cosmic.frame.threads import WorkerThread
@@ -19,6 +21,8 @@ from cosmic.vico.core.lens_history import LensHistory
 from cosmic.vico.core.lens_move import Move
 from cosmic.vico.core.lens_side import IDLE_S, LensSide, LightSide
 from cosmic.vico.hw.peripherals import Lens, LensAxis, LensState, Light
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +99,8 @@ class PeripheralThread(WorkerThread):
     ----------
     history : LensHistory
         Where the motors were, and how bright it was, at moments past.
+    heartbeat : Heartbeat
+        Stays away while a call of a driver does not return.
     """
 
     may_wait = False
@@ -121,6 +127,9 @@ class PeripheralThread(WorkerThread):
         self._wake = Condition()
         self._abort_wanted = False
         self._over = False
+        self._stall = ""
+        self._running: tuple[Task, ...] = ()
+        self.heartbeat = Heartbeat(self._on_stall)
         self._state = PeripheralState(clock.now_s(), WALL.now_s())
         self._published = self._state
 
@@ -195,13 +204,35 @@ class PeripheralThread(WorkerThread):
 
     def _put(self, order: _Order) -> Task:
         with self._wake:
-            over = self._over
-            if not over:
+            refused = "lens and light are closed" if self._over else self._stall
+            if not refused:
                 self._orders.append(order)
                 self._wake.notify_all()
-        if over:
-            order.task.fail(NotAvailable("lens and light are closed"))
+        if refused:
+            order.task.fail(NotAvailable(refused))
         return order.task
+
+    def _on_stall(self, stalled_s: float) -> None:
+        """Say that a driver hangs, or that it goes on; thread of the watch."""
+        text = (
+            f"lens and light: a driver has not returned from a call for {stalled_s:g} s; whether "
+            "the lens moves is unknown. Unplug it and plug it in again, or restart the program"
+        )
+        with self._wake:
+            self._stall = text if stalled_s else ""
+            left = list(self._orders) if stalled_s else []
+            self._orders = deque(each for each in self._orders if each not in left)
+        if not stalled_s:
+            logger.warning("lens and light: the driver has returned, and goes on")
+            return
+        logger.error("%s", text)
+        error = NotAvailable(text)
+        for task in (*(each.task for each in left), *self._lens.tasks, *self._running):
+            task.fail(error)
+        self._state = self._published = PeripheralState(
+            self._clock.now_s(), WALL.now_s(), lens_problem=text, light_problem=text
+        )
+        self.state_changed.emit(self._state)
 
     @override
     def request_end(self) -> None:
@@ -216,6 +247,7 @@ class PeripheralThread(WorkerThread):
         try:
             self._open()
             while not self.end_requested:
+                self.heartbeat.beat()
                 self._publish()
                 self._rest()
                 self._obey()
@@ -223,8 +255,10 @@ class PeripheralThread(WorkerThread):
                 self._light.look()
         finally:
             self._close()
+            self.heartbeat.end()
 
     def _open(self) -> None:
+        self.heartbeat.beat(OPEN_S)
         self._lens.open()
         self._light.open()
         self._lens.look()
@@ -252,6 +286,8 @@ class PeripheralThread(WorkerThread):
                 self._carry_out(order)
 
     def _carry_out(self, order: _Order) -> None:
+        self.heartbeat.beat()
+        self._running = (order.task,)
         try:
             order.carry_out(order.task)
         except CosmicError as exc:

@@ -14,6 +14,7 @@ from cosmic.frame.errors import (
     NotAvailable,
     ProtocolError,
 )
+from cosmic.frame.operation import Task
 from cosmic.vico.core.lens_history import LensHistory
 from cosmic.vico.core.lens_move import Move
 from cosmic.vico.hw.peripherals import Lens, LensAxis, LensState, Light
@@ -131,6 +132,11 @@ class LensSide:
     def busy(self) -> bool:
         """Something moves, or should."""
         return bool(self._moves) or any(each.moving for each in self.states.values())
+
+    @property
+    def tasks(self) -> tuple[Task, ...]:
+        """The tasks of movements under way; any thread."""
+        return tuple(each.task for each in tuple(self._moves))
 
     def open(self) -> None:
         """Open it, unless it is open; `problem` says when that failed."""

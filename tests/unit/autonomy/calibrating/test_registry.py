@@ -1,5 +1,6 @@
 """What the calibration registry keeps, and whether it lets one be used."""
 
+import math
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -78,6 +79,59 @@ def test_a_poor_one_is_listed_with_its_reason_and_never_in_force(
     (listed,) = registry.entries
     assert registry.standing(listed) is CalibrationStanding.POOR
     assert "30 um" in listed.problem
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf])
+def test_what_is_no_number_is_never_in_force_and_keeps_nothing_else_from_being_kept(
+    registry: CalibrationRegistry, tmp_path: Path, wrong: float
+) -> None:
+    good = entry(registry)
+    registry.put(good)
+    for other in (replace(good, values={"up_um": wrong}), replace(good, residual=wrong)):
+        with pytest.raises(ConfigError, match="no number; measure it again"):
+            registry.put(other)
+    found = registry.get("height", "left")
+    assert found is not None
+    assert found.values == good.values
+    bad = replace(good, values={"up_um": wrong, "x_um": 1.0}, residual=wrong)
+    registry.refuse(bad, f"residual {wrong}")
+    assert registry.get("height", "left") is None
+    (kept,) = CalibrationRegistry(tmp_path / "kept").entries
+    assert (dict(kept.values), kept.problem) == ({"x_um": 1.0}, f"residual {wrong}")
+    registry.put(entry(registry, "depth"))
+    assert len(CalibrationRegistry(tmp_path / "kept").entries) == 2
+
+
+def test_what_others_do_to_the_file_meanwhile_stays(
+    registry: CalibrationRegistry, tmp_path: Path
+) -> None:
+    registry.put(entry(registry, "first"))
+    registry.put(entry(registry, "second"))
+    other = CalibrationRegistry(tmp_path / "kept")
+    other.put(entry(other, "third"))
+    other.forget("first", "left")
+    registry.put(entry(registry, "fourth"))
+    kept = CalibrationRegistry(tmp_path / "kept").entries
+    assert [each.name for each in kept] == ["fourth", "second", "third"]
+    assert [each.name for each in registry.entries] == ["fourth", "second", "third"]
+    found = registry.get("third", "left")
+    assert found is not None
+    assert registry.standing(found) is CalibrationStanding.UNCHECKED
+    other.put(entry(other, "second", residual=3.0))
+    registry.put(entry(registry, "second", residual=1.0))
+    assert {each.name: each.residual for each in registry.entries}["second"] == 1.0
+
+
+def test_a_file_that_became_wrong_meanwhile_stays_and_is_named(
+    registry: CalibrationRegistry, tmp_path: Path
+) -> None:
+    registry.put(entry(registry))
+    file = tmp_path / "kept" / "calibrations.toml"
+    file.write_text("format = 1\n[[entry", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"calibrations\.toml: not valid TOML"):
+        registry.put(entry(registry, "depth"))
+    assert file.read_text(encoding="utf-8") == "format = 1\n[[entry"
+    assert registry.get("depth", "left") is not None
 
 
 def test_one_is_forgotten_and_listeners_are_notified(registry: CalibrationRegistry) -> None:

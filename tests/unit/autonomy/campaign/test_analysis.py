@@ -1,12 +1,14 @@
 """Final values come from the raw files alone: the same again, or it is said what changed."""
 
 import dataclasses
+import json
 import math
 import random
 import shutil
 import sqlite3
 from pathlib import Path
 
+import h5py
 import pytest
 
 from cosmic.app.cli import main
@@ -15,7 +17,7 @@ from cosmic.autonomy.campaign.provenance import Provenance, sha256_of, write_pro
 from cosmic.autonomy.campaign.records import STANDARD, CampaignError, Outcome, Shape
 from cosmic.autonomy.campaign.report import write_report
 from cosmic.autonomy.campaign.stop_rule import StandardSchedule
-from cosmic.autonomy.campaign.storage_format import read_raw
+from cosmic.autonomy.campaign.storage_format import FINAL, read_raw
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.errors import CosmicError
@@ -148,6 +150,36 @@ def test_what_beside_the_raw_files_is_not_as_it_was_written_is_named(
     assert f"{image.name}: its SHA-256 differs" in said
     assert "fibres/00077.h5 belongs to no fibre of the record" in said
     assert main(["recompute", str(campaign)]) == 0
+
+
+def test_fitted_curves_that_were_altered_or_lost_are_named_and_written_anew(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with h5py.File(folder / FINAL, "r+") as file:
+        file["00001/00"][0] += 1.0
+    assert main(["recompute", str(folder)]) == 4
+    assert "not as it was written: analysis.h5: its SHA-256 differs" in capsys.readouterr().out
+    (folder / FINAL).unlink()
+    assert main(["recompute", str(folder)]) == 4
+    assert "not as it was written: analysis.h5: is missing" in capsys.readouterr().out
+    with CampaignStore.open(folder, run=False) as store:
+        finish(store)
+    assert main(["recompute", str(folder)]) == 0
+
+
+def test_a_campaign_that_kept_no_sum_of_its_fitted_curves_is_read_as_before(
+    campaign: Path, tmp_path: Path
+) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        (text,) = base.execute("SELECT analysis_json FROM campaign").fetchone()
+        kept = json.loads(text)
+        assert kept.pop("fitted_sha256") == sha256_of(folder / FINAL)
+        base.execute("UPDATE campaign SET analysis_json = ?", (json.dumps(kept),))
+    base.close()
+    (folder / FINAL).unlink()
+    assert main(["recompute", str(folder)]) == 0
 
 
 def recorded(campaign: Path, folder: Path, *, hashed: bool) -> Path:

@@ -10,9 +10,20 @@ import pytest
 from cosmic.autonomy.control.sources import ChannelSource, PositionSource
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.scale import Scale
+from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.frame.errors import ConfigError, CosmicError, LimitError
 
 SCALE = Scale("Probe", "uN", (0.0, 20.0))
+
+
+def settings(name: str = "force", input_: str = "ai0", **changes: object) -> DaqcoSettings:
+    channel = {"name": name, "board": "Dev1", "input": input_, "scale": "Probe"} | changes
+    scales = (
+        {"name": "Probe", "unit": "uN", "coefficients": (0.0, 20.0)},
+        {"name": "Same", "unit": "uN", "coefficients": (0.0, 20.0)},
+        {"name": "Fifth", "unit": "uN", "coefficients": (0.0, 4.0)},
+    )
+    return DaqcoSettings.model_validate({"channel": (channel,), "scale": scales})
 
 
 class Daqco:
@@ -21,6 +32,9 @@ class Daqco:
     channels = ("force",)
     units = {"force": "uN"}  # noqa: RUF012 - nobody changes it
     running, problem = True, ""
+
+    def __init__(self) -> None:
+        self.settings = settings()
 
     def subscribe(self, receiver: Callable[[DataChunk], object]) -> Callable[[], None]:
         self.put = receiver
@@ -53,6 +67,29 @@ def test_a_channel_that_was_renamed_ends_the_loop_with_its_name():
     daqco.put(chunk("push"))
     (error,) = errors
     assert "no channel force any more: renamed, or switched off" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"scale": "Fifth"}, "the scale of force changed; begin the loop again"),
+        ({"input_": "ai1"}, "the input of force changed"),
+        ({"low_v": -5.0}, "the range of force changed"),
+        ({"active": False}, "no channel force any more: renamed, or switched off"),
+    ],
+)
+def test_another_quantity_under_the_same_name_ends_the_loop(changed: dict[str, Any], said: str):
+    daqco: Any = Daqco()
+    errors: list[CosmicError] = []
+    source = ChannelSource(daqco, "force", stale_s=1.0, pause_s=1.0)
+    source.begin(errors.append)
+    daqco.settings = settings(scale="Same")
+    daqco.put(chunk("force"))
+    assert not errors
+    daqco.settings = settings(**changed)
+    daqco.put(chunk("force"))
+    (error,) = errors
+    assert said in str(error)
 
 
 def test_a_position_beyond_the_limits_of_a_loop_ends_it_as_a_force_does():

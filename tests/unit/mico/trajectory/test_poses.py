@@ -39,6 +39,29 @@ def test_what_the_user_wrote_into_the_file_stays(tmp_path: Path) -> None:
     assert list(PoseBook(path).poses) == ["b", "c"]
 
 
+@pytest.mark.parametrize("name", ["a", "b", "c"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "b.q = 2.0\nb.x = 3.0\na = {x = 1.0, y = 2.0} # of a\n",
+        "b.q = 2.0\nb.'left.x' = 3.0\na.x = 1.0\nb.x = 2.0\n[c]\nx = 1.0\n",
+        "a.x = 1.0\nb.x = 1.0\na.y = 2.0\n# the last\n[c]\nx = 1.0\n",
+    ],
+)
+def test_poses_that_the_user_wrote_with_dots_are_changed_as_others(
+    text: str, name: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "poses.toml"
+    path.write_text(text, encoding="utf-8")
+    book = PoseBook(path)
+    others = {each: pose for each, pose in book.poses.items() if each != name}
+    book.put(Pose(name, {"x": 5.0}))
+    assert book.path == path
+    assert PoseBook(path).poses == {**others, name: Pose(name, {"x": 5.0})}
+    book.remove(name)
+    assert PoseBook(path).poses == others
+
+
 def test_what_is_said_above_a_pose_stays_there_when_the_one_before_changes(tmp_path: Path) -> None:
     path = tmp_path / "poses.toml"
     others = '# of b\n[b]\n"left.x" = 2.0\n\n# the end\n'

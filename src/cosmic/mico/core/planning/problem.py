@@ -3,11 +3,15 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 from cosmic.frame.errors import UnknownAxisError, refusal
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.core.collision.answer import Approach, Spans
 from cosmic.mico.core.collision.model import SceneModel
+
+LONGEST_S: Final = 3600.0
+"""Longer is a slip of the pen; of some weeks, no time that the system waits for an answer."""
 
 
 @dataclass(frozen=True)
@@ -121,10 +125,9 @@ def validate(model: SceneModel, problem: Problem) -> None:
     LimitError
         A target lies outside its limits.
     """
-    if not 0.0 < problem.budget_s < math.inf:
-        raise refusal(
-            refuse(Reason.NOT_FINITE, f"{problem.budget_s!r} s is no time to plan a path in")
-        )
+    if not 0.0 < problem.budget_s <= LONGEST_S:
+        text = f"{problem.budget_s!r} s is no time to plan a path in; give up to {LONGEST_S:g} s"
+        raise refusal(refuse(Reason.NOT_FINITE, text))
     for axis in (*problem.goal, *problem.start):
         if axis not in model.axes:
             raise UnknownAxisError(axis, model.axes)

@@ -45,8 +45,8 @@ class ProfileBook:
         self._path = path
         self._guard = RLock()
         self._given = {each.name: each for each in settings.profile}
-        kept = load_model(path, _Kept).profile if path is not None and path.exists() else ()
-        self._profiles = self._given | {each.name: each for each in kept}
+        self._profiles = self._given | self._in_file()
+        self._changed_here: set[str] = set()
 
     @property
     def path(self) -> Path | None:
@@ -128,16 +128,27 @@ class ProfileBook:
             if self._profiles.get(profile.name) == profile:
                 return
             self._profiles[profile.name] = profile
+            self._changed_here.add(profile.name)
             self._write()
 
+    def _in_file(self) -> dict[str, TeleoperationProfileSettings]:
+        """Return what the file holds now; raises `ConfigError`."""
+        path = self._path
+        if path is None or not path.exists():
+            return {}
+        return {each.name: each for each in load_model(path, _Kept).profile}
+
     def _write(self) -> None:
+        """Write what was changed here; the rest of the file stays as it is now."""
         path = self._path
         if path is None:
             return
-        changed = [each for name, each in self._profiles.items() if each != self._given.get(name)]
         try:
+            here = {name: self._profiles[name] for name in self._changed_here}
+            profiles = (self._in_file() | here).items()
+            changed = [each for name, each in profiles if each != self._given.get(name)]
             write_whole(path, HEAD + "".join(map(_section, changed)))
-        except OSError as exc:
+        except (OSError, ConfigError) as exc:
             self._path = None
             logger.warning("%s cannot be written (%s): profiles are kept in memory", path, exc)
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Final
 
+from cosmic.frame.kept_file import open_file
 from cosmic.mico.core.trajectory.model import Problem, Trajectory, TrajectoryError
 from cosmic.mico.core.trajectory.reader import OnProgress, TrajectoryReader
 
@@ -26,7 +27,7 @@ def load(path: Path, progress: OnProgress | None = None, *, cut_off: bool = Fals
         The file cannot be read, or something in it is wrong; names each line.
     """
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             data = file.read(LARGEST_BYTES + 1)
     except (OSError, ValueError) as exc:  # a name with a zero in it is no OSError
         text = f"cannot be read: {exc}"
