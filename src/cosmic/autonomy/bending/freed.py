@@ -31,7 +31,7 @@ def freed_of(
     relaxation_part: float,
     others: Loads = NO_LOADS,
     *,
-    way_std_un: float = 0.0,
+    stage_std_un: float = 0.0,
 ) -> tuple[float, float]:
     """Return ln of the force after by that before, and its standard deviation; nan: unknown.
 
@@ -43,7 +43,7 @@ def freed_of(
         Part of the force that goes in a tenfold time: it fell by that meanwhile as well.
     others : Loads
         Of other spans, from which the fibre still comes back.
-    way_std_un : float
+    stage_std_un : float
         What the force is off where the probe is as far off its place as its stages repeat: a slide
         does not bring it back any better, and a short span is pushed by little.
     """
@@ -63,5 +63,5 @@ def freed_of(
     fell = relaxation_part * math.log10(1.0 + freed.wait_s / READ_S)
     came_back = relaxation_part * float(-np.diff(others.lost_un(read_s))[0]) / before
     after = 2.0 / (1.0 / up + 1.0 / down)
-    std = math.hypot(noise / before, way_std_un / before, 0.5 * fell, 0.5 * came_back)
+    std = math.hypot(noise / before, stage_std_un / before, 0.5 * fell, 0.5 * came_back)
     return math.log(after / before) + fell - came_back, std

@@ -271,8 +271,8 @@ def _freed(fits: Sequence[SpanFit], rows: Sequence["_Row"]) -> tuple[Floats, Flo
     """Return what is to be added to ln(k), and its covariance; None: friction never let go.
 
     On the way out a section askew was as much too stiff as the force fell once friction let go, and
-    as in the other spans, but for twist: each counts by how well it is known. On the way back it may
-    have turned round, by any part of that: how far depends on the section.
+    as in the other spans, but for twist: each counts by how well it is known. On the way back it
+    may have turned round, by any part of that: how far depends on the section.
     """
     logs = np.array([each.freed_log for each in fits])
     stds = np.array([each.freed_std_part for each in fits])

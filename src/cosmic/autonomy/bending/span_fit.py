@@ -238,7 +238,7 @@ class _Model:
             slope[branch & pressed] = math.exp(min(values[2 * number], HIGHEST_LOG))
         return np.hypot(points.std_un, slope * self._settings.way_std_um)
 
-    def way_std_un(self, values: Floats) -> float:
+    def stage_std_un(self, values: Floats) -> float:
         """Return what the force of the way out is off by the noise of the stage."""
         return math.exp(min(float(values[0]), HIGHEST_LOG)) * self._settings.way_std_um
 
@@ -445,7 +445,7 @@ def _span_result(
     fitted[points.kept] = model.total(values)
     baseline_un = values[-3] + values[-2] * (span.time_s - points.time_s[0])
     freed = freed_of(
-        span, baseline_un, values[-1], model.others, way_std_un=model.way_std_un(values)
+        span, baseline_un, values[-1], model.others, stage_std_un=model.stage_std_un(values)
     )
     out, back = (values[:2], values[2:4]) if both else (values[:2], (math.nan, math.nan))
     stds = np.sqrt(np.diag(covariance))

@@ -53,12 +53,12 @@ def test_spans_that_were_not_slid_are_taken_to_be_held_like_the_others_and_less_
     assert half_width_percent(one_slid) > half_width_percent(all_slid)
 
 
-def test_a_slide_at_a_short_push_tells_little_for_the_probe_comes_back_only_so_well() -> None:
+def test_a_slide_where_little_was_pushed_is_known_less_well() -> None:
     span = held(pushed(rig())[0], up=0.9, down=0.9)
     level = np.full(len(span.probe_um), LEVEL_UN)
     before_un = float(span.force_un[AFTER]) - LEVEL_UN
     exact = freed_of(span, level, 0.0)
-    known = freed_of(span, level, 0.0, way_std_un=0.15 * before_un)
+    known = freed_of(span, level, 0.0, stage_std_un=0.15 * before_un)
     assert known[0] == exact[0] == pytest.approx(math.log(0.9))
     assert known[1] == pytest.approx(math.hypot(exact[1], 0.15))
 
