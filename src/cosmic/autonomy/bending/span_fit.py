@@ -232,10 +232,13 @@ class _Model:
         """Return the noise foreseen of each reading by itself: the sensor's, and the stage's."""
         points, slope = self._points, np.zeros(len(self._points.probe_um))
         for number, branch in enumerate(self.branches):
-            # Just before the hinge too: there, a stage a little ahead has touched already.
+            # Just before the hinge too: there, a stage a little ahead has touched already. It grows
+            # by and by, or rounding would decide about a point that lies where it begins.
             ahead = points.probe_um - values[2 * number + 1]
-            pressed = ahead > -CLOSE_SIGMAS * self._settings.way_std_um
-            slope[branch & pressed] = math.exp(min(values[2 * number], HIGHEST_LOG))
+            sigmas = ahead / max(self._settings.way_std_um, TINY)
+            pressed = np.clip(sigmas + CLOSE_SIGMAS + 0.5, 0.0, 1.0)
+            of_branch = pressed * math.exp(min(values[2 * number], HIGHEST_LOG))
+            slope[branch] = of_branch[branch]
         return np.hypot(points.std_un, slope * self._settings.way_std_um)
 
     def stage_std_un(self, values: Floats) -> float:
