@@ -188,8 +188,12 @@ def _shared(
                 left, rest = reduce(add, others).with_unknown(std)
                 of_each[number] = own - left, pull - rest
 
+    # In units of what is known beforehand: a compliance in um/uN is small beside a place in um.
+    unit = np.sqrt(np.diag(prior.covariance))
+
     def without(own: Floats, pull: Floats) -> Common:
-        covariance = np.asarray(np.linalg.inv(total - own), dtype=np.float64)
+        scaled = np.linalg.inv((total - own) * np.outer(unit, unit))
+        covariance = np.asarray(scaled * np.outer(unit, unit), dtype=np.float64)
         return Common(np.asarray(covariance @ (pulled - pull)), covariance)
 
     none = np.zeros_like(total), np.zeros_like(pulled)

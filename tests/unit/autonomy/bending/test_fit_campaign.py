@@ -93,6 +93,26 @@ def test_what_the_fit_knows_beside_the_stiffness_is_taken_off_each_span() -> Non
         assert np.mean(read) > np.mean(left) + 0.03  # they are read 6 % too stiff
 
 
+def test_what_is_common_does_not_hang_on_rounding() -> None:
+    """A compliance in um/uN, here known well, stands beside places in um."""
+    exact = SETTINGS.model_copy(update={"jaw_std_part": 1e-5, "sensor_std_part": 1e-5})
+    session, chance = Session(WORLD, np.random.default_rng(11)), np.random.default_rng(1)
+    kept = [measured(session, Fibre.drawn(session), exact) for _ in range(6)]
+    standard = measured(session, Fibre.standard(session), exact, CERTIFICATE)
+
+    def rounded(fibre: MeasuredFibre) -> MeasuredFibre:
+        assert fibre.readings is not None
+        off = 1e-13 * chance.standard_normal(len(fibre.readings.log_k))
+        readings = dataclasses.replace(fibre.readings, log_k=fibre.readings.log_k + off)
+        return dataclasses.replace(fibre, readings=readings)
+
+    found, again = (
+        [each.ei_n_m2 for each in fit_campaign(fibres, standards=[standard], settings=exact)]
+        for fibres in (kept, [*map(rounded, kept)])
+    )
+    assert again == pytest.approx(found, rel=1e-11)
+
+
 def test_a_span_off_the_model_is_named_by_how_much() -> None:
     spans = sorted(pushed_on_rig(rig(contact_std_um=0.1)), key=lambda each: each.nominal_um)
     odd = dataclasses.replace(spans[2], force_un=1.12 * spans[2].force_un)
