@@ -111,7 +111,7 @@ def test_what_is_common_does_not_hang_on_rounding() -> None:
         for fibres in (kept, *([*map(rounded, kept)] for _ in range(6)))
     ]
     for each in found[1:]:
-        assert each == pytest.approx(found[0], rel=1e-10)
+        assert each == pytest.approx(found[0], rel=1e-10, abs=0.0)
 
 
 def test_a_span_off_the_model_is_named_by_how_much() -> None:
