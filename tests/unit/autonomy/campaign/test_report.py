@@ -200,7 +200,7 @@ def test_the_written_table_is_read_back_the_same(folder: Path, tmp_path: Path) -
     assert list(frame.columns) == list(COLUMNS)
     written = pd.DataFrame(read_campaign(folder))
     assert frame["ei_n_m2"].to_numpy() == pytest.approx(
-        written["ei_n_m2"].to_numpy(), rel=1e-6, nan_ok=True
+        written["ei_n_m2"].to_numpy(), rel=1e-6, abs=0.0, nan_ok=True
     )
 
 
