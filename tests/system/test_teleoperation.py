@@ -194,7 +194,8 @@ def test_a_channel_that_measures_no_force_and_a_board_that_is_lost_let_nothing_g
             teleoperation.start(pad.key, "left assembly")
         daqco.set_scale("force", before)
         teleoperation.start(pad.key, "left assembly")
-        wait_until(lambda: teleoperation.state.slowed == 1.0)
+        wait_until(lambda: teleoperation.state.feedback_hz > 0.0)  # samples come
+        assert teleoperation.state.slowed == 1.0
         daqco.application.library.faults.inject("unplugged", board="Dev1")
         wait_until(lambda: not daqco.running)
         WALL.sleep(0.3)
