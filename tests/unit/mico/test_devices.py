@@ -1,6 +1,10 @@
+import gc
+import subprocess
+import sys
 import threading
 
 import pytest
+from PySide6.QtCore import SIGNAL
 
 import cosmic
 from cosmic.frame.clock import WALL
@@ -204,3 +208,67 @@ def test_a_commander_without_the_lease_moves_nothing():
             stranger.move_absolute(0, 1.0, "um").wait(2)
         assert refused.value.verdict.reason == "NO_LEASE"
         assert not controller.of("move_to")
+
+
+DROPPED = """
+import gc, sys, threading, time
+from PySide6.QtCore import QCoreApplication, QObject, Signal
+from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander
+
+class Device(QObject):
+    position_changed = Signal(object)
+    state_changed = Signal(object)
+    movement_ended = Signal(object)
+    movement_refused = Signal(object)
+
+class Script:
+    def __init__(self):
+        self.itself = self
+        self.commander = DeviceCommander("token")
+        self.commander.attach(device, CommanderType.OUTPUT)
+
+def tell():
+    while not ended:
+        device.state_changed.emit(1)
+
+app, device, ended = QCoreApplication([]), Device(), []
+thread = threading.Thread(target=tell)
+sys.setswitchinterval(1e-4)
+thread.start()
+until_s = time.monotonic() + 2.0
+while time.monotonic() < until_s:
+    for _ in range(20):
+        Script()
+    gc.collect()
+ended.append(True)
+thread.join()
+"""
+
+
+def test_a_commander_that_is_dropped_while_its_device_tells_harms_nothing():
+    """The collector deletes it, in any thread: the process must live on."""
+    done = subprocess.run(
+        [sys.executable, "-X", "faulthandler", "-c", DROPPED],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_commander_that_was_dropped_leaves_nothing_at_its_device():
+    with mico() as (rig, _):
+        manager = rig.application.manager
+        device = manager.devices[0]
+
+        def receivers():
+            return device.receivers(SIGNAL("state_changed(PyObject)"))
+
+        before = receivers()
+        dropped = DeviceCommander(manager.lease.holder.token)
+        manager.connect_device_commander(0, dropped, CommanderType.OUTPUT)
+        assert receivers() == before + 1
+        del dropped
+        gc.collect()
+        assert receivers() == before

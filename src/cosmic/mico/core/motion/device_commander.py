@@ -1,8 +1,10 @@
 """`DeviceCommander`: the run-time API of one device, joined to it at run time (thesis 6.1.2)."""
 
 from abc import abstractmethod
+from collections.abc import Callable
 from enum import Flag, auto
 from typing import Protocol
+from weakref import finalize, ref
 
 from PySide6.QtCore import QMetaObject, QObject, Qt, Signal
 
@@ -93,6 +95,7 @@ class DeviceCommander(QObject):
         self._device: Commanded | None = None
         self._latch: StopLatch | None = None
         self._connections: list[QMetaObject.Connection] = []
+        finalize(self, _part, self._connections).atexit = False
 
     def attach(
         self, device: Commanded, kind: CommanderType, latch: StopLatch | None = None
@@ -101,23 +104,20 @@ class DeviceCommander(QObject):
         self.detach()
         self._latch = latch
         if CommanderType.OUTPUT in kind:
-            pairs = (
-                (device.position_changed, self.position_changed),
-                (device.state_changed, self.state_changed),
-                (device.movement_ended, self.movement_ended),
-                (device.movement_refused, self.movement_refused),
-            )
             direct = Qt.ConnectionType.DirectConnection
-            self._connections = [signal.connect(heard, direct) for signal, heard in pairs]
+            self._connections += [
+                device.position_changed.connect(_told(self, "position_changed"), direct),
+                device.state_changed.connect(_told(self, "state_changed"), direct),
+                device.movement_ended.connect(_told(self, "movement_ended"), direct),
+                device.movement_refused.connect(_told(self, "movement_refused"), direct),
+            ]
         if CommanderType.INPUT in kind:
             self._device = device
 
     def detach(self) -> None:
         """Part from the device."""
         self._device = None
-        connections, self._connections = self._connections, []
-        for connection in connections:
-            QObject.disconnect(connection)
+        _part(self._connections)
 
     def move_absolute(
         self, channel: int, target: float, unit: AxisUnit, *, consent: bool = False
@@ -209,3 +209,24 @@ class DeviceCommander(QObject):
         order = Order(channel, motion, self._token, said, consent, follows=follows, epoch=epoch)
         device.submit(order)
         return order
+
+
+def _told(commander: DeviceCommander, name: str) -> Callable[[object], None]:
+    """Return what has a commander tell by its signal what a device tells.
+
+    The commander is held meanwhile. A signal joined to a signal would not: one that is dropped is
+    deleted by the collector, in any thread, and the device's thread would tell what is gone.
+    """
+    weak = ref(commander)
+
+    def tell(what: object) -> None:
+        alive = weak()
+        if alive is not None:
+            getattr(alive, name).emit(what)
+
+    return tell
+
+
+def _part(connections: list[QMetaObject.Connection]) -> None:
+    while connections:
+        QObject.disconnect(connections.pop())
