@@ -227,12 +227,12 @@ class Script:
         self.commander = DeviceCommander("token")
         self.commander.attach(device, CommanderType.OUTPUT)
 
-def tell():
+def emit():
     while not ended:
         device.state_changed.emit(1)
 
 app, device, ended = QCoreApplication([]), Device(), []
-thread = threading.Thread(target=tell)
+thread = threading.Thread(target=emit)
 sys.setswitchinterval(1e-4)
 thread.start()
 until_s = time.monotonic() + 2.0
@@ -245,7 +245,7 @@ thread.join()
 """
 
 
-def test_a_commander_that_is_dropped_while_its_device_tells_harms_nothing():
+def test_a_commander_that_is_deleted_while_its_device_emits_ends_no_process():
     """The collector deletes it, in any thread: the process must live on."""
     done = subprocess.run(
         [sys.executable, "-X", "faulthandler", "-c", DROPPED],

@@ -106,10 +106,10 @@ class DeviceCommander(QObject):
         if CommanderType.OUTPUT in kind:
             direct = Qt.ConnectionType.DirectConnection
             self._connections += [
-                device.position_changed.connect(_told(self, "position_changed"), direct),
-                device.state_changed.connect(_told(self, "state_changed"), direct),
-                device.movement_ended.connect(_told(self, "movement_ended"), direct),
-                device.movement_refused.connect(_told(self, "movement_refused"), direct),
+                device.position_changed.connect(_relay(self, "position_changed"), direct),
+                device.state_changed.connect(_relay(self, "state_changed"), direct),
+                device.movement_ended.connect(_relay(self, "movement_ended"), direct),
+                device.movement_refused.connect(_relay(self, "movement_refused"), direct),
             ]
         if CommanderType.INPUT in kind:
             self._device = device
@@ -211,20 +211,20 @@ class DeviceCommander(QObject):
         return order
 
 
-def _told(commander: DeviceCommander, name: str) -> Callable[[object], None]:
-    """Return what has a commander tell by its signal what a device tells.
+def _relay(commander: DeviceCommander, name: str) -> Callable[[object], None]:
+    """Return what emits by a signal of a commander what its device emitted.
 
     The commander is held meanwhile. A signal joined to a signal would not: one that is dropped is
-    deleted by the collector, in any thread, and the device's thread would tell what is gone.
+    deleted by the collector, in any thread, and the device's thread would emit by what is gone.
     """
     weak = ref(commander)
 
-    def tell(what: object) -> None:
+    def emit(value: object) -> None:
         alive = weak()
         if alive is not None:
-            getattr(alive, name).emit(what)
+            getattr(alive, name).emit(value)
 
-    return tell
+    return emit
 
 
 def _part(connections: list[QMetaObject.Connection]) -> None:
