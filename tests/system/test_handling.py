@@ -1,5 +1,7 @@
 """The shipped procedures on the twin, through the scripted API only; scored by its truth."""
 
+import re
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +22,7 @@ from cosmic.autonomy.shipped.bend_test import build_bend_test, build_transport
 from cosmic.frame.failure import FailurePolicy
 from cosmic.twin.truth import TrueFibre, TruthRecord, read_truth
 
+CONFIG = Path(cosmic.__file__).parents[2] / "config"
 RATE = 8.0
 # The limit has a dead man of a tenth of a second of the wall, which a busy machine oversleeps.
 SETTINGS = HandlingSettings(push=PushSettings(stop_un=0.0))
@@ -27,8 +30,10 @@ LIMIT_UN = 0.8 * 180.0
 
 
 @contextmanager
-def sample(name: str, truth: Path, seed: int = 0) -> Iterator[SimpleNamespace]:
-    with cosmic.connect(sample=name, rate=RATE, seed=seed, truth=truth) as rig:
+def sample(
+    name: str, truth: Path, seed: int = 0, config: Path | None = None
+) -> Iterator[SimpleNamespace]:
+    with cosmic.connect(config=config, sample=name, rate=RATE, seed=seed, truth=truth) as rig:
         work = HandlingContext.on(rig, SETTINGS)
         try:
             yield SimpleNamespace(rig=rig, work=work)
@@ -139,6 +144,22 @@ def test_a_fibre_that_was_lost_on_the_path_is_found_and_measured_all_the_same(
         check(record, fibre, fell=bool(record.of("dropped", true_fibre(record, fibre).number)))
     assert len(good) == 3, "none is measured twice"
     assert {true_fibre(record, fibre).number for fibre in good} == {0, 1, 2}
+
+
+@pytest.mark.slow
+def test_a_fibre_that_broke_off_is_not_taken_for_held_because_it_lies_right_below(tmp_path: Path):
+    brittle = tmp_path / "config"
+    shutil.copytree(CONFIG, brittle)
+    text = (brittle / "twin.toml").read_text(encoding="utf-8")
+    text = re.sub(r"(?m)^weak_strain_high = .*$", "weak_strain_high = 0.0008", text)
+    (brittle / "twin.toml").write_text(text, encoding="utf-8")
+    with sample("three-dry", tmp_path / "truth.jsonl", seed=2, config=brittle) as bench:
+        bench.rig.faults.inject("fibre_break")
+        with pytest.raises(OperationFailed, match="no longer in the jaws") as failure:
+            carried_out(bench.work, build_bend_test(SETTINGS))
+        failed = [(name, each.cause) for name, each in bench.work.failures]
+    assert failure.value.cause == "dropped"
+    assert failed.count(("push the spans", "no contact")) == 1, "nothing is pushed where it was"
 
 
 @pytest.mark.slow

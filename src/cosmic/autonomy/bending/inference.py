@@ -27,7 +27,7 @@ VARIATIONS: Final = np.array([0.0, 0.05, 0.1, 0.17, 0.28, 0.45])
 """How much ln(EI) varies along a fibre, one standard deviation: those that are weighed."""
 
 VARIATION_PRIOR: Final = np.array([0.05, 0.1, 0.2, 0.25, 0.25, 0.15])
-"""Paper fibres: 10 to 30 % between places 50 to 300 um apart, and weak places every 30 to 100 um."""
+"""Of paper: 10 to 30 % between places 50 to 300 um apart, weak places every 30 to 100 um."""
 
 LOW_TAIL, HIGH_TAIL = 0.025, 0.975
 EXACT: Final = 1e-15

@@ -108,6 +108,10 @@ SEEN_PART: Final = 0.35
 REACH_UM: Final = 70.0
 BEGIN_UM: Final = 60.0
 LENGTH_UM: Final = 320.0
+ASIDE_UM: Final = 2.5 * REACH_UM
+FOLLOWED_PART: Final = 0.75
+FOLLOWED_UM: Final = 15.0
+"""What goes along with the jaws is as dark as it was, and as far beside where it should be."""
 
 
 class TestGrasp(FibreOperation):
@@ -164,10 +168,17 @@ def seen_at(
     work: HandlingContext, fibre: HeldFibre, image: CameraImage, line_um: Floats, height_um: float
 ) -> bool:
     """Return whether something as dark as the fibre lies along a line, or next to it."""
+    contrast, _ = _traced(work, image, line_um, height_um)
+    return contrast > SEEN_PART * fibre.reach.candidate.contrast
+
+
+def _traced(
+    work: HandlingContext, image: CameraImage, line_um: Floats, height_um: float
+) -> tuple[float, float]:
+    """Return how dark it is along a line, or next to it, in grey levels, and how far aside, um."""
     mapped = work.mapped_near(image, height_um)
     trace = trace_along(image, mapped.to_px(line_um), REACH_UM / mapped.scale_um_px)
-    contrast = fibre.reach.candidate.contrast
-    return trace.contrast > SEEN_PART * contrast
+    return trace.contrast, trace.offset_px * mapped.scale_um_px
 
 
 class Carry(FibreOperation):
@@ -195,6 +206,34 @@ def see_held(work: HandlingContext, fibre: HeldFibre) -> Generator[Yielded, obje
     image = yield work.image()
     assert isinstance(image, CameraImage)
     if not seen_at(work, fibre, image, in_jaws(work, fibre), work.hold_tip_um):
-        fibre.held, work.shared.surveyed = False, False
-        raise OperationFailed(DROPPED, f"fibre {fibre.number} is no longer in the jaws")
+        raise _lost_from_jaws(work, fibre)
     return image
+
+
+def see_it_follow(work: HandlingContext, fibre: HeldFibre) -> Steps:
+    """See that a fibre goes along when the jaws go aside, away from the probe, and come back.
+
+    What fell, or broke off, lies right under the jaws, and looks from above as if they held it.
+
+    Raises
+    ------
+    OperationFailed
+        It does not.
+    """
+    x, y = work.tip_now(work.gripper)
+    here = yield from see_held(work, fibre)
+    dark, beside_um = _traced(work, here, in_jaws(work, fibre), work.hold_tip_um)
+    aside = ASIDE_UM if work.probe.forward[1] > 0 else -ASIDE_UM
+    yield work.go(work.at(work.gripper, x, y + aside))
+    there = yield from see_held(work, fibre)
+    dark_there, beside_there_um = _traced(work, there, in_jaws(work, fibre), work.hold_tip_um)
+    # Another one may lie there, or one may have crossed the fibre before and made it darker.
+    least = FOLLOWED_PART * min(dark, fibre.reach.candidate.contrast)
+    if dark_there < least or abs(beside_there_um - beside_um) > FOLLOWED_UM:
+        raise _lost_from_jaws(work, fibre)
+    yield work.go(work.at(work.gripper, x, y))
+
+
+def _lost_from_jaws(work: HandlingContext, fibre: HeldFibre) -> OperationFailed:
+    fibre.held, work.shared.surveyed = False, False
+    return OperationFailed(DROPPED, f"fibre {fibre.number} is no longer in the jaws")

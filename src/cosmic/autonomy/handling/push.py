@@ -28,7 +28,7 @@ from cosmic.autonomy.handling.force_limit import (
     guard_probe,
     put_back,
 )
-from cosmic.autonomy.handling.grasp import see_held, shape_of
+from cosmic.autonomy.handling.grasp import see_it_follow, shape_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.prepare import retract_probe
 from cosmic.autonomy.handling.retrying_move import RetryingMove
@@ -639,7 +639,7 @@ class StepBack(FibreOperation):
         back = push.stand_off_um + push.search_um
         yield work.go(work.at(work.probe, x, y - back * (1.0 if work.probe.forward[1] > 0 else -1)))
         if failure.cause == NO_CONTACT:
-            yield from see_held(work, fibre)
+            yield from see_it_follow(work, fibre)
 
 
 class Retract(FibreOperation):

@@ -299,7 +299,7 @@ def test_a_standard_that_is_not_met_far_out_is_tried_where_fibres_are_before_it_
         tried.append((span_limits(bench).longest_um, fibre.tilts))
         not_met = OperationFailed(NO_CONTACT, "the probe met nothing")
         bench.failures.append(("push the spans", not_met))
-        monkeypatch.setattr(push, "see_held", lambda *_: iter(()))
+        monkeypatch.setattr(push, "see_it_follow", lambda *_: iter(()))
         carried_out(StepBack().run(bench))
     assert tried == [(900.0, 0), (600.0, 0), (330.0, 1), (330.0, 2)]
 
