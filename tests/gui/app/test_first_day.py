@@ -1,15 +1,37 @@
 """The first day: the window says what is missing and what to press, down to the first click."""
 
+import shutil
+from pathlib import Path
+
+import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.panels.first_day import DayStep, FirstDayPanel, Standing
+from cosmic.app.panels.first_day import DayStep, FirstDayPanel, FirstDaySteps, Standing
+from cosmic.app.rig import Rig
+from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.gui.theme import State
-from gui.app.windows import Make
+from gui.app.windows import Make, mico
 
 LEFT = Qt.MouseButton.LeftButton
+ONE_AXIS = """\
+[platform]
+name = "New"
+applications = ["mico"]
+scene = ""
+
+[mico]
+backend = "simulated"
+
+[[mico.positioner]]
+name = "left.x"
+device = 0
+channel = 0
+kind = "linear"
+limits_um = [-5500.0, 5500.0]
+"""
 
 
 def test_a_step_says_how_far_it_is_and_its_button_carries_it_out(qtbot: QtBot) -> None:
@@ -61,6 +83,75 @@ def test_no_line_moves_when_a_button_goes(qtbot: QtBot) -> None:
     QApplication.processEvents()
     assert not panel.rows["First"].button.isVisible()
     assert second.geometry() == before
+
+
+def test_what_runs_is_cancelled_by_the_button_of_its_line(qtbot: QtBot) -> None:
+    running = ["it"]
+
+    def look() -> Standing:
+        if running:
+            return Standing(State.BUSY, "position 3 of 9")
+        return Standing(State.UNKNOWN, "not yet", "Begin")
+
+    step = DayStep("First", look, lambda: "begun", cancel=running.clear)
+    panel = FirstDayPanel((step,))
+    qtbot.addWidget(panel)
+    panel.show()
+    (row,) = panel.rows.values()
+    assert (row.button.text(), row.button.isEnabled()) == ("Cancel", True)
+    qtbot.mouseClick(row.button, LEFT)
+    assert not running
+    assert (row.badge.state, row.button.text()) == (State.UNKNOWN, "Begin")
+    qtbot.mouseClick(row.button, LEFT)
+    assert panel.message.text() == "begun"
+
+
+def test_the_line_of_positions_says_that_they_are_being_found_and_cancels_that(
+    make: Make, qtbot: QtBot
+) -> None:
+    window = make(applications=("mico", "daqco", "vico"), cold=True, rate=1.0)
+    window.raise_panel("First day")
+    tasks = window.tasks
+    assert tasks is not None
+    row = tasks.first_day.rows["Positions"]
+    qtbot.waitUntil(lambda: row.button.text() == "Initialise")
+    qtbot.mouseClick(row.button, LEFT)
+    question = mico(window).caution
+    assert question is not None
+    qtbot.mouseClick(question.go, LEFT)
+    qtbot.waitUntil(lambda: row.badge.state is State.BUSY)
+    qtbot.waitUntil(lambda: "referencing" in row.text.text())
+    qtbot.mouseClick(tasks.first_day.rows["Devices"].button, LEFT)
+    assert "Initialisation is running" in tasks.first_day.message.text()
+    assert row.button.text() == "Cancel"
+    qtbot.mouseClick(row.button, LEFT)
+    qtbot.waitUntil(lambda: row.button.text() == "Initialise", timeout=10_000)
+    assert row.badge.state is State.UNKNOWN
+
+
+def test_axes_that_nobody_has_named_do_not_count_as_missing(
+    make: Make, qtbot: QtBot, tmp_path: Path
+) -> None:
+    shutil.copytree(shipped_config_dir(), tmp_path, dirs_exist_ok=True)
+    (tmp_path / "platform.toml").write_text(ONE_AXIS, encoding="utf-8")
+    window = make(config=tmp_path, applications=("mico",))
+    steps = FirstDaySteps(
+        Rig(window.platform),
+        mico(window),
+        configured=("left.x",),
+        force=False,
+        tool=str,
+        camera=pytest.fail,
+        folder=lambda: tmp_path,
+        click=lambda: None,
+    )
+    qtbot.waitUntil(lambda: steps.devices().state is not State.BUSY)
+    assert steps.devices() == Standing(State.OK, "1 axes answer", "Rescan")
+    assert "device0.channel1" in steps.names().text
+    assert "paste" in steps.copy_entries()
+    copied = QApplication.clipboard().text()
+    assert 'name = "device0.channel1"' in copied
+    assert "was not read" in copied, "nobody has read where it stands"
 
 
 def test_a_failure_of_before_is_not_shown_as_what_is_missing_now(make: Make, qtbot: QtBot) -> None:

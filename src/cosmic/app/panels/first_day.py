@@ -58,12 +58,15 @@ class DayStep:
     look : callable
         Returns how far it is.
     act : callable
-        What its button does.
+        What its button does; text that it returns is shown.
+    cancel : callable or None
+        Ends what runs; None: it ends by itself, and soon.
     """
 
     title: str
     look: Callable[[], Standing]
     act: Callable[[], object]
+    cancel: Callable[[], object] | None = None
 
 
 class FirstDaySteps:
@@ -103,14 +106,14 @@ class FirstDaySteps:
         """All of them, in order."""
         rig = self._rig
         return (
-            DayStep("Devices", self.devices, self._gui.rescan),
+            DayStep("Devices", self.devices, lambda: self._gui.mico.rescan(wait=False)),
             DayStep("Names", self.names, self.copy_entries),
-            DayStep("Positions", self.positions, self._gui.initialise),
+            DayStep("Positions", self.positions, self.initialise, self.cancel_initialisation),
             *((DayStep("Force", self.force, rig.daqco.start),) if self._force else ()),
             DayStep("Camera", self.camera, lambda: self._camera().start()),
-            DayStep("Lens", self.lens, self.home_lens),
-            DayStep("Scale and rotation", self.scale, self.calibrate),
-            DayStep("Know your stage", self.stage, self.check_stage),
+            DayStep("Lens", self.lens, self.home_lens, self.abort_lens),
+            DayStep("Scale and rotation", self.scale, self.calibrate, self.cancel_calibration),
+            DayStep("Know your stage", self.stage, self.check_stage, self.cancel_check),
             DayStep("First click-to-move", self.click, self._click),
         )
 
@@ -121,11 +124,14 @@ class FirstDaySteps:
             return Standing(State.ERROR, f"{mico.failure}. Check power and cable.", "Rescan")
         if not mico.ready:
             return Standing(State.BUSY, "Looking for devices")
-        absent = [axis.key for axis in mico if not axis.details.present]
+        # What nobody has named is not used, and counts as absent there.
+        own = [axis for axis in mico if axis.key in self._configured]
+        absent = [axis.key for axis in own if not axis.details.present]
         if absent:
-            text = f"{len(absent)} axes of the platform file do not answer: {', '.join(absent)}"
+            of = f"{len(absent)} of {len(own)} axes"
+            text = f"{of} of the platform file do not answer: {', '.join(absent)}"
             return Standing(State.ERROR, text, "Rescan")
-        return Standing(State.OK, f"{len(list(mico))} axes answer", "Rescan")
+        return Standing(State.OK, f"{len(own)} axes answer", "Rescan")
 
     def names(self) -> Standing:
         """Look for axes that nobody has named."""
@@ -135,18 +141,38 @@ class FirstDaySteps:
         if not found:
             return Standing(State.OK, "Every axis has a name and a place")
         text = (
-            f"{len(found)} axes have no entry in the platform file. Copy entries, name and limit "
-            "them there; cosmic setup --write does the same"
+            f"Without entry in the platform file: {', '.join(each.name for each in found)}. Copy "
+            "entries, name and limit them there; cosmic setup --write does the same"
         )
         return Standing(State.UNKNOWN, text, "Copy entries")
 
-    def copy_entries(self) -> None:
+    def copy_entries(self) -> str:
         """Put the entries for axes without a name into the clipboard."""
         found = unnamed_axes(self._gui.mico, self._configured)
         QGuiApplication.clipboard().setText(entries(found))
+        return "Entries copied: paste them into the platform file, then start again"
+
+    @property
+    def _initialising(self) -> Task | None:
+        """What drives all axes now; none of its own counts while devices are looked for."""
+        task = self._gui.mico.application.running_task
+        return task if task is not None and not task.done and self._gui.mico.ready else None
+
+    def initialise(self) -> None:
+        """Begin the initialisation sequence."""
+        if why := self._gui.busy:
+            raise NotAvailable(why)
+        self._gui.initialise()
+
+    def cancel_initialisation(self) -> None:
+        """End the initialisation sequence; what moves is stopped."""
+        _cancel(self._initialising)
 
     def positions(self) -> Standing:
         """Look at what is known of the positions."""
+        running = self._initialising
+        if running is not None:
+            return Standing(State.BUSY, running.progress.text or running.title)
         unknown = [
             axis.key
             for axis in self._gui.mico
@@ -167,7 +193,8 @@ class FirstDaySteps:
         armed = [each.settings.channel for each in daqco.limits if each.settings.armed]
         channels = ", ".join(daqco.channels)
         if not armed:
-            return Standing(State.UNKNOWN, f"{channels} are measured; no limit is armed")
+            text = f"{channels} are measured; no limit is armed. Set one in Measure, Limit…"
+            return Standing(State.UNKNOWN, text)
         return Standing(
             State.OK, f"{channels} are measured; a limit of {', '.join(armed)} is armed"
         )
@@ -200,6 +227,11 @@ class FirstDaySteps:
         if self._rig.vico.lens is not None:
             self._rig.vico.lens.home()
 
+    def abort_lens(self) -> None:
+        """Stop both motors."""
+        if self._rig.vico.lens is not None:
+            self._rig.vico.lens.abort()
+
     def scale(self) -> Standing:
         """Look at the calibration of the camera."""
         running = self._calibrating
@@ -216,6 +248,10 @@ class FirstDaySteps:
     def calibrate(self) -> None:
         """Measure scale and rotation by moving the tool."""
         self._calibrating = self._rig.vico.calibrate_stage(self._tool(), self._camera().name)
+
+    def cancel_calibration(self) -> None:
+        """End the calibration; the tool stays where it is then."""
+        _cancel(self._calibrating)
 
     def stage(self) -> Standing:
         """Look at what is known of the axes."""
@@ -238,6 +274,10 @@ class FirstDaySteps:
         self._check, self._checking = transform.check_stage(self._tool(), self._camera().name)
         self._checking.add_callback(self._keep)
 
+    def cancel_check(self) -> None:
+        """End the check of the axes; the tool stays where it is then."""
+        _cancel(self._check)
+
     def _keep(self, found: Operation[StageReport]) -> None:
         if found.failure is not None:
             return
@@ -255,6 +295,11 @@ class FirstDaySteps:
         if problem:
             return Standing(State.UNKNOWN, "After scale and rotation")
         return Standing(State.OK, f"Click into the image: the {self._tool()} goes there", "Try it")
+
+
+def _cancel(running: Task | None) -> None:
+    if running is not None:
+        running.cancel()
 
 
 class FirstDayPanel(QWidget):
@@ -293,14 +338,14 @@ class FirstDayPanel(QWidget):
         for row in self.rows.values():
             row.refresh()
 
-    def _attempt(self, step: DayStep) -> None:
+    def _attempt(self, step: DayStep, act: Callable[[], object]) -> None:
         try:
-            step.act()
+            said = act()
         except CosmicError as exc:
             self.message.setText(f"{step.title}: {exc}")
             self.refused.emit(str(exc))
         else:
-            self.message.setText("")
+            self.message.setText(said if isinstance(said, str) else "")
         self.refresh()
 
     @override
@@ -318,8 +363,10 @@ class FirstDayPanel(QWidget):
 class _Row:
     """The widgets of one step."""
 
-    def __init__(self, step: DayStep, attempt: Callable[[DayStep], None]) -> None:
-        self._step = step
+    def __init__(
+        self, step: DayStep, attempt: Callable[[DayStep, Callable[[], object]], None]
+    ) -> None:
+        self._step, self._attempt, self._act = step, attempt, step.act
         self.badge = StateBadge()
         self.title = QLabel(step.title)
         self.text = QLabel()
@@ -328,7 +375,7 @@ class _Row:
         place = self.button.sizePolicy()
         place.setRetainSizeWhenHidden(True)  # no row moves while another one is clicked
         self.button.setSizePolicy(place)
-        self.button.clicked.connect(lambda: attempt(step))
+        self.button.clicked.connect(lambda: self._attempt(step, self._act))
 
     def refresh(self) -> None:
         standing = self._step.look()
@@ -336,7 +383,11 @@ class _Row:
         text = with_micro_signs(standing.text)
         if self.text.text() != text:
             self.text.setText(text)
-        self.button.setVisible(bool(standing.button))
-        if standing.button and self.button.text() != standing.button:
-            self.button.setText(standing.button)
-        self.button.setEnabled(standing.state is not State.BUSY)
+        busy = standing.state is State.BUSY
+        cancel = self._step.cancel if busy else None
+        self._act = self._step.act if cancel is None else cancel
+        words = standing.button if cancel is None else "Cancel"
+        self.button.setVisible(bool(words))
+        if words and self.button.text() != words:
+            self.button.setText(words)
+        self.button.setEnabled(cancel is not None or not busy)
