@@ -4,7 +4,7 @@ from abc import abstractmethod
 
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent
-from PySide6.QtGui import QFontMetricsF
+from PySide6.QtGui import QFont, QFontMetricsF
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from cosmic.frame.gui.palette import Palette
@@ -13,6 +13,10 @@ from cosmic.frame.overrides import override
 
 _GAP_PX = 2
 _AROUND_PX = 8
+
+
+def _tick_font() -> QFont:
+    return number_font(11)
 
 
 class CurveFrame(QWidget):
@@ -55,6 +59,8 @@ class CurveFrame(QWidget):
         self._layout.addItem(axis, row=row, col=0)
         self._layout.addItem(box, row=row, col=1)
         self._layout.layout.setRowStretchFactor(row, share)
+        if row > 0:  # the lowest figure of one field and the highest of the next lie half outside
+            self._layout.layout.setRowSpacing(row - 1, QFontMetricsF(_tick_font()).height())
         return box, axis
 
     def _add_axis_below(self, name: str) -> pg.AxisItem:
@@ -80,7 +86,7 @@ class CurveFrame(QWidget):
         for axis, name in self._names.items():
             axis.setPen(palette.border_strong)
             axis.setTextPen(palette.text)
-            axis.setStyle(tickFont=number_font(11), tickLength=4)
+            axis.setStyle(tickFont=_tick_font(), tickLength=4)
             axis.setLabel(name, color=palette.dim)
         self._fit_names()
         self._colour(palette)
