@@ -309,18 +309,19 @@ class ResultCurves(CurveFrame):
         for line in self.cursors.lines:
             line.setPen(pg.mkPen(palette.accent, width=1.5))
             line.setHoverPen(pg.mkPen(palette.text, width=2.5))
-        self._name_curves()
+        self._name_curves(palette.field)
 
-    def _name_curves(self) -> None:
+    def _name_curves(self, ground: str) -> None:
         """Write into each field which curve is which, where that is not said beside it."""
         forces = [(name, colour) for name, colour, _, _ in self._lines]
         named = (forces if len(forces) > 1 else [], self._moved)
         for key, entries in zip(self._keys, named, strict=True):
             words = (
-                f'<span style="color:{readable(OKABE_ITO[colour])}">{escape(name)}</span>'
+                f'<span style="color:{readable(OKABE_ITO[colour])};background-color:{ground}">'
+                f"&nbsp;{escape(name)}&nbsp;</span>"
                 for name, colour in entries
             )
-            key.setHtml("&nbsp; ".join(words))
+            key.setHtml("".join(words))
 
 
 def _key_in(box: pg.ViewBox) -> QGraphicsTextItem:
