@@ -13,7 +13,7 @@ from cosmic.app.rig import Rig
 from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.gui.theme import State
-from gui.app.windows import Make, mico
+from gui.app.windows import Make, drive, mico, wait_until_ready
 
 LEFT = Qt.MouseButton.LeftButton
 ONE_AXIS = """\
@@ -189,6 +189,32 @@ def test_a_cold_platform_says_what_is_missing_and_what_to_press(make: Make, qtbo
     assert rows["Scale and rotation"].button.text() == "Calibrate"
     assert rows["First click-to-move"].text.text() == "After scale and rotation"
     QApplication.processEvents()
+
+
+def test_what_was_found_of_the_axes_is_there_at_the_next_start(
+    make: Make, qtbot: QtBot, tmp_path: Path
+) -> None:
+    shutil.copytree(shipped_config_dir(), tmp_path, dirs_exist_ok=True)
+    window = make(config=tmp_path, applications=("mico", "daqco", "vico"), rate=8.0)
+    wait_until_ready(window, qtbot)
+    drive(window, qtbot, "left.z", -1450.0)
+    window.raise_panel("First day")
+    tasks = window.tasks
+    assert tasks is not None
+    row = tasks.first_day.rows["Know your stage"]
+    qtbot.waitUntil(lambda: row.text.text().startswith("Moves the left "))
+    qtbot.mouseClick(row.button, LEFT)
+    qtbot.waitUntil(lambda: row.badge.state is State.BUSY)
+    qtbot.waitUntil(lambda: row.badge.state is not State.BUSY, timeout=120_000)
+    assert row.badge.state is State.OK, row.text.text()
+    qtbot.waitUntil(lambda: f"noted: {tmp_path / 'platform.toml'}" in row.text.text())
+    window.close_now()
+    again = make(config=tmp_path, applications=("mico", "daqco", "vico"), hardware=False)
+    again.raise_panel("First day")
+    assert again.tasks is not None
+    row = again.tasks.first_day.rows["Know your stage"]
+    qtbot.waitUntil(lambda: "left.x repeats within" in row.text.text())
+    assert row.badge.state is State.OK
 
 
 def test_the_axes_of_a_tool_with_a_tip_are_checked_whatever_is_chosen(

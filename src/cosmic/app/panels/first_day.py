@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Final
 
@@ -10,10 +11,11 @@ from PySide6.QtGui import QGuiApplication, QHideEvent, QShowEvent
 from PySide6.QtWidgets import QGridLayout, QLabel, QVBoxLayout, QWidget
 
 from cosmic.app.commands.setup import entries, unnamed_axes
+from cosmic.app.configuration.axes_seen import note_axes
 from cosmic.app.rig import Rig
 from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.autonomy.stage_check import StageReport
-from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State
@@ -80,6 +82,8 @@ class FirstDaySteps:
         Returns where the report on the axes goes; may raise `OSError`.
     click : callable
         Shows the image with a click that moves the tool.
+    config : Path or None
+        The platform file, where what is found of axes is noted; None: nowhere.
     """
 
     def __init__(
@@ -93,7 +97,9 @@ class FirstDaySteps:
         camera: Callable[[], CameraHandle],
         folder: Callable[[], Path],
         click: Callable[[], object],
+        config: Path | None = None,
     ) -> None:
+        self._config = config
         self._rig, self._gui, self._configured, self._force = rig, gui, configured, force
         self._tool, self._camera, self._folder, self._click = tool, camera, folder, click
         self._calibrating: Task | None = None
@@ -259,11 +265,34 @@ class FirstDaySteps:
             return Standing(State.BUSY, self._check.progress.text or "Checking the axes")
         found = self._checking
         if found is None:
-            text = f"Moves the {self._tool()} to positions from both sides and looks at its tip"
-            return Standing(State.UNKNOWN, text, "Check axes")
+            return self._known_stage() or Standing(
+                State.UNKNOWN,
+                f"Moves the {self._tool()} to positions from both sides and looks at its tip; what "
+                "is found is noted in the platform file",
+                "Check axes",
+            )
         if found.failure is not None:
             return Standing(State.ERROR, f"The last check failed: {found.failure}", "Check axes")
         return Standing(State.OK, f"{found.result.text}\n{self._report}", "Check axes")
+
+    def _known_stage(self) -> Standing | None:
+        """Return what the platform file has of the axes of the tool; None where it has nothing."""
+        carrying = self._axes_of(self._tool())
+        lines = [
+            f"{each.name} repeats within {each.repeatability_um:.2f} µm, "
+            f"backlash {each.backlash_um or 0.0:+.2f} µm"
+            for each in self._gui.mico.settings.positioner
+            if each.name in carrying and each.repeatability_um is not None
+        ]
+        if not lines:
+            return None
+        return Standing(State.OK, "\n".join([*lines, "As the platform file has it"]), "Check axes")
+
+    def _axes_of(self, tool: str) -> tuple[str, ...]:
+        try:
+            return self._gui.mico.tools[tool].axes
+        except CosmicError:  # without a scene nothing tells what carries it
+            return ()
 
     def check_stage(self) -> None:
         """Begin to measure the axes of the tool by the camera."""
@@ -287,7 +316,17 @@ class FirstDaySteps:
         except OSError as exc:
             self._report = f"not kept: {exc}"
         else:
-            self._report = f"written: {path}"
+            self._report = f"written: {path}\n{self._note(found.result)}"
+
+    def _note(self, report: StageReport) -> str:
+        """Note what was found in the platform file; return what became of it."""
+        if self._config is None:
+            return "Not noted in a platform file: there is none of your own"
+        try:
+            note_axes(self._config, report, f"{datetime.now().astimezone():%Y-%m-%d}")
+        except (ConfigError, OSError) as exc:
+            return f"Not noted in the platform file: {exc}"
+        return f"noted: {self._config}"
 
     def click(self) -> Standing:
         """Look at whether a click can move the tool."""
