@@ -106,6 +106,30 @@ def test_what_runs_is_cancelled_by_the_button_of_its_line(qtbot: QtBot) -> None:
     assert panel.message.text() == "begun"
 
 
+def test_the_focus_goes_to_no_other_button_when_one_is_done(qtbot: QtBot) -> None:
+    done: list[str] = []
+
+    def look() -> Standing:
+        return Standing(State.OK, "known") if done else Standing(State.UNKNOWN, "not", "Initialise")
+
+    panel = FirstDayPanel(
+        (
+            DayStep("First", look, lambda: done.append("initialised")),
+            DayStep("Second", lambda: Standing(State.OK, "known", "Calibrate"), pytest.fail),
+        )
+    )
+    qtbot.addWidget(panel)
+    panel.show()
+    panel.activateWindow()
+    first = panel.rows["First"].button
+    first.setFocus()
+    qtbot.waitUntil(first.hasFocus)
+    qtbot.keyClick(first, Qt.Key.Key_Space)
+    assert done == ["initialised"]
+    assert not panel.rows["Second"].button.hasFocus()
+    qtbot.keyClick(panel.focusWidget() or panel, Qt.Key.Key_Space)
+
+
 def test_the_line_of_positions_says_that_they_are_being_found_and_cancels_that(
     make: Make, qtbot: QtBot
 ) -> None:

@@ -17,6 +17,7 @@ from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.autonomy.stage_check import StageReport
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.gui.build import named, push_button
+from cosmic.frame.gui.key_focus import set_shown, set_usable
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State
 from cosmic.frame.kept_file import write_whole
@@ -355,7 +356,7 @@ class FirstDayPanel(QWidget):
     def __init__(self, steps: Sequence[DayStep], parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("firstDay")
-        self.rows = {step.title: _Row(step, self._attempt) for step in steps}
+        self.rows = {step.title: _Row(step, self, self._attempt) for step in steps}
         self.message = named(QLabel(), "firstDayMessage")
         self.message.setWordWrap(True)
         grid = QGridLayout()
@@ -403,9 +404,12 @@ class _Row:
     """The widgets of one step."""
 
     def __init__(
-        self, step: DayStep, attempt: Callable[[DayStep, Callable[[], object]], None]
+        self,
+        step: DayStep,
+        owner: QWidget,
+        attempt: Callable[[DayStep, Callable[[], object]], None],
     ) -> None:
-        self._step, self._attempt, self._act = step, attempt, step.act
+        self._step, self._owner, self._attempt, self._act = step, owner, attempt, step.act
         self.badge = StateBadge()
         self.title = QLabel(step.title)
         self.text = QLabel()
@@ -426,7 +430,7 @@ class _Row:
         cancel = self._step.cancel if busy else None
         self._act = self._step.act if cancel is None else cancel
         words = standing.button if cancel is None else "Cancel"
-        self.button.setVisible(bool(words))
+        set_shown(self.button, self._owner, shown=bool(words))
         if words and self.button.text() != words:
             self.button.setText(words)
-        self.button.setEnabled(cancel is not None or not busy)
+        set_usable(self.button, self._owner, usable=cancel is not None or not busy)
