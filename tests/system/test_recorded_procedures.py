@@ -16,6 +16,7 @@ from cosmic.autonomy.recorded.replay import replay_on
 from cosmic.autonomy.recorded.steps import (
     MoveStep,
     OperationStep,
+    PauseStep,
     RecordedProcedure,
     WaitForForceStep,
     WaitForOperatorStep,
@@ -104,6 +105,16 @@ def test_a_replay_waits_for_the_operator_and_can_be_ended() -> None:
         again.abort("enough")
         again.join()
         assert rig.mico["left.x"].position_um == pytest.approx(-50.0, abs=1.0)
+
+
+def test_the_result_of_a_replay_has_the_values_it_was_given() -> None:
+    step = PauseStep(seconds=60.0, ask={"seconds": "How long, s"})
+    given = RecordedProcedure(name="wait", step=[step]).with_values({(0, "seconds"): 0.1})
+    with cosmic.connect(rate=20.0) as rig:
+        replay_on(rig.handling, given, Surroundings()).run_here()
+        result = rig.handling.result
+        assert result is not None
+        assert (result.title, result.values) == ("Replay wait", (("step 1, time", "0.1 s"),))
 
 
 def test_a_script_that_replays_asks_whether_to_go_on() -> None:

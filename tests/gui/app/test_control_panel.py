@@ -4,10 +4,12 @@ from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QFontMetricsF
 from pytestqt.qtbot import QtBot
 
 import cosmic
-from cosmic.app.panels.control import ControlPanel, make_control_panel
+from cosmic.app.panels.control import ControlPanel, ControlPlot, make_control_panel
+from cosmic.frame.gui.theme import number_font
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -36,6 +38,18 @@ def panel(rig: cosmic.Rig, qtbot: QtBot) -> Iterator[ControlPanel]:
 
 def click(qtbot: QtBot, panel: ControlPanel, name: str) -> None:
     qtbot.mouseClick(getattr(panel, name), LEFT)
+
+
+def test_figures_at_the_axes_of_the_two_fields_do_not_touch(qtbot: QtBot) -> None:
+    plot = ControlPlot()
+    qtbot.addWidget(plot)
+    plot.resize(700, 400)
+    plot.show()
+    qtbot.waitExposed(plot)
+    above, below = (box.sceneBoundingRect() for box in (plot.value_box, plot.output_box))
+    figures = QFontMetricsF(number_font(11)).height()
+    gap = below.top() - above.bottom()
+    assert gap >= figures - 1.0, "half of each figure lies outside its field"
 
 
 def test_it_offers_channels_of_force_and_linear_axes(panel: ControlPanel) -> None:

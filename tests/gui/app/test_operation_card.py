@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING, cast
 import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QMouseEvent
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.operation_card import OperationCard, at_work
 from cosmic.autonomy.procedures.run import RunState
 from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState, NodeView
+from cosmic.autonomy.shipped.single_operation import OperationResult
 
 if TYPE_CHECKING:
     from cosmic.autonomy.handling.context import HandlingContext
@@ -78,3 +79,14 @@ def test_the_second_click_of_a_double_click_ends_nothing(qtbot: QtBot) -> None:
     assert not run.aborted
     qtbot.mouseClick(card.stop, Qt.MouseButton.LeftButton)
     assert run.aborted
+
+
+def test_values_that_have_no_room_are_counted(qtbot: QtBot) -> None:
+    card = OperationCard(50.0)
+    qtbot.addWidget(card)
+    values = tuple((f"step {number}, force", f"{number} µN") for number in range(1, 7))
+    card.show_result(OperationResult("Replay six", good=True, text="Done.", values=values))
+    shown = [each.text() for each in card.findChildren(QLabel) if each.isVisibleTo(card)]
+    assert "step 3, force" in shown
+    assert "step 4, force" not in shown
+    assert "and 3 more" in shown

@@ -13,6 +13,7 @@ from cosmic.autonomy.recorded.steps import (
     LightStep,
     MoveStep,
     OperationStep,
+    PauseStep,
     RecordedProcedure,
     RecordedStep,
 )
@@ -159,6 +160,50 @@ def test_the_numbers_of_a_step_are_changed_in_the_list(panel: RecorderPanel, qtb
     qtbot.mouseClick(dialog.buttons.button(QDialogButtonBox.StandardButton.Ok), LEFT)
     assert texts(panel) == ["1  Light 40 %", "2  Lens: zoom 1x, focus 3900 counts"]
     assert panel.list.currentRow() == 1
+
+
+def accept(qtbot: QtBot, panel: RecorderPanel, value: str) -> None:
+    dialog = panel.findChild(ValuesDialog)
+    assert dialog is not None
+    dialog.fields[0].setText(value)
+    qtbot.mouseClick(dialog.buttons.button(QDialogButtonBox.StandardButton.Ok), LEFT)
+
+
+def test_a_number_goes_to_its_step_wherever_that_stands_by_then(
+    panel: RecorderPanel, qtbot: QtBot
+) -> None:
+    panel.show_steps([PauseStep(seconds=1.0), PauseStep(seconds=2.0), PauseStep(seconds=3.0)], 1)
+    panel.edit()
+    panel.list.setCurrentRow(0)
+    qtbot.mouseClick(panel.delete, LEFT)
+    accept(qtbot, panel, "20")
+    assert texts(panel) == ["1  Pause 20 s", "2  Pause 3 s"]
+
+
+def test_a_number_for_a_step_that_is_gone_changes_no_other(
+    panel: RecorderPanel, qtbot: QtBot
+) -> None:
+    panel.show_steps([PauseStep(seconds=1.0), PauseStep(seconds=2.0)], 1)
+    panel.edit()
+    qtbot.mouseClick(panel.delete, LEFT)
+    accept(qtbot, panel, "20")
+    assert texts(panel) == ["1  Pause 1 s"]
+    assert "is no longer in the list" in panel.line.text()
+
+
+def test_no_replay_begins_with_steps_that_are_no_longer_shown(
+    panel: RecorderPanel, qtbot: QtBot
+) -> None:
+    replayed: list[object] = []
+    panel.replay_requested.connect(replayed.append)
+    panel.show_steps([PauseStep(seconds=1.0), PauseStep(seconds=2.0)], 1)
+    qtbot.mouseClick(panel.ask, LEFT)
+    qtbot.mouseClick(panel.replay, LEFT)
+    panel.list.setCurrentRow(0)
+    qtbot.mouseClick(panel.delete, LEFT)
+    accept(qtbot, panel, "20")
+    assert not replayed
+    assert "press Replay again" in panel.line.text()
 
 
 def test_what_an_operation_does_not_use_is_not_asked_for(panel: RecorderPanel) -> None:

@@ -16,6 +16,7 @@ import pyqtgraph as pg
 import pytest
 import tifffile
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QGraphicsTextItem
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.results.panel import ResultsPanel
@@ -28,6 +29,8 @@ from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import ChannelSettings
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.amounts import size_text
+from cosmic.frame.gui.palette import DARK, LIGHT, blend, contrast_ratio
+from cosmic.frame.gui.theme import apply_theme, current_palette
 from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.core.recording.formats import ImageFormat
 from cosmic.vico.core.recording.image_file import ImageFile
@@ -188,6 +191,44 @@ def shown_items(panel: ResultsPanel, kind: type[Any]) -> list[Any]:
     assert view is not None
     found = [each for each in view.scene().items() if isinstance(each, kind) and each.isVisible()]
     return sorted(found, key=lambda each: each.sceneBoundingRect().top())
+
+
+def keys(panel: ResultsPanel) -> list[str]:
+    """Return what is written into the fields, from above."""
+    texts = [each.toPlainText() for each in shown_items(panel, QGraphicsTextItem)]
+    return [each.replace("\xa0", " ").strip() for each in texts]
+
+
+def test_each_curve_has_its_name_in_its_colour(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "soft.h5", slope=5.0)
+    write_force(tmp_path / "stiff.h5", slope=50.0)
+    panel.refresh()
+    choose(panel, qtbot, "soft")
+    assert "left.x" in keys(panel)
+    assert "soft" not in keys(panel), "one curve of force is named by its axis"
+    choose(panel, qtbot, "stiff", also=True)
+    qtbot.waitUntil(lambda: "soft  stiff" in keys(panel))
+
+
+def test_the_cursors_are_drawn_in_the_colours_of_the_theme(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path, qapp: QApplication
+) -> None:
+    write_force(tmp_path / "push.h5")
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    cursors, before = panel.viewer.curves.cursors, current_palette()
+    try:
+        for palette in (LIGHT, DARK):
+            apply_theme(qapp, palette.name)
+            QApplication.sendPostedEvents()
+            assert contrast_ratio(cursors.lines[0].pen.color().name(), palette.field) >= 3.0
+            filled = cursors.brush.color()
+            ground = blend(filled.name(), palette.field, filled.alphaF())
+            assert contrast_ratio(palette.text, ground) >= 7.0
+    finally:
+        apply_theme(qapp, before.name)
 
 
 @pytest.mark.parametrize("share", [1000, 10])

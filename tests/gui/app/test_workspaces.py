@@ -697,6 +697,23 @@ def test_the_drawer_opens_over_the_picture_and_escape_closes_it(
     assert not whole.top_bar.latched
 
 
+def test_an_open_drawer_follows_the_size_of_the_window(whole: OperatorWindow, qtbot: QtBot) -> None:
+    before = whole.size()
+    whole.raise_panel("Log")
+    body = whole.findChild(QWidget, "drawerBody")
+    assert isinstance(body, QWidget)
+    try:
+        for page, shrunk in (("Log", 40), ("Alarms", 80)):
+            whole.drawer.show_page(page)
+            whole.resize(before.width() - shrunk, before.height() - shrunk)
+            qtbot.waitUntil(lambda: body.width() == whole.width())
+            edge = whole.drawer.mapTo(whole, whole.drawer.rect().topLeft()).y()
+            assert body.geometry().bottom() + 1 == edge
+    finally:
+        whole.drawer.show_page("")
+        whole.resize(before)
+
+
 def test_the_pad_moves_the_chosen_tool_by_the_step(whole: OperatorWindow, qtbot: QtBot) -> None:
     choose(whole, qtbot, HANDLE)
     tool = tasks(whole).tool

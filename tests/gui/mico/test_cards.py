@@ -7,6 +7,7 @@ from pytestqt.qtbot import QtBot
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import State
+from cosmic.mico.core.motion.positioner import Confidence
 from cosmic.mico.core.settings import MotionDefaults
 from cosmic.mico.gui.axis_table import AxisRow
 from cosmic.mico.gui.card import ConfidenceMark
@@ -246,6 +247,20 @@ def test_a_refusal_by_the_stop_ends_with_the_reset(panel: MicoWidget, qtbot: QtB
     qtbot.waitUntil(lambda: "reset the stop" in entry.reason)
     panel.show_stopped(None)
     assert not entry.reason
+
+
+def test_figures_that_say_no_position_are_grey(panel: MicoWidget, qtbot: QtBot) -> None:
+    card = panel.cards["left.x"]
+    row = AxisRow(card, MotionDefaults(), panel)
+    for cell in row.cells:
+        qtbot.addWidget(cell)
+    figures = part(row.position, "rowPosition", QLabel), part(card, card.position_name, QLabel)
+    state = card.axis.details
+    for confidence, usable in ((Confidence.UNKNOWN, False), (Confidence.ESTIMATED, True)):
+        row.show_state(replace(state, confidence=confidence))
+        card.show_state(replace(state, confidence=confidence))
+        assert [each.isEnabled() for each in figures] == [usable, usable]
+    card.show_state(state)
 
 
 def test_no_badge_says_ok_while_everything_is_stopped(panel: MicoWidget, qtbot: QtBot) -> None:

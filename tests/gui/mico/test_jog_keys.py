@@ -1,3 +1,4 @@
+import logging
 from collections.abc import Iterator
 
 import pytest
@@ -34,6 +35,16 @@ def test_a_held_key_moves_and_its_release_stops(slow: MicoWidget, qtbot: QtBot) 
     qtbot.waitUntil(lambda: at_rest(slow, "left.x"))
     assert position(slow.cards["left.x"]) > 0.0
     assert position(slow.cards["left.y"]) == 0.0
+
+
+def test_the_log_says_which_way_how_fast_and_that_a_key_was_held(
+    slow: MicoWidget, qtbot: QtBot, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.INFO, "cosmic.mico"):
+        hold(qtbot, slow, Qt.Key.Key_D, "left.x")
+        qtbot.keyRelease(slow.focusWidget(), Qt.Key.Key_D)
+        qtbot.waitUntil(lambda: at_rest(slow, "left.x"))
+    assert "left.x jogs right at 200 um/s, by key" in caplog.messages
 
 
 def test_the_other_key_of_an_axis_moves_it_back(slow: MicoWidget, qtbot: QtBot) -> None:

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QWidget
 from cosmic.mico.core.teleoperation.state import TeleoperationPhase as Phase
 from cosmic.mico.gui.mapping_table import DIRECTION, NOW, SCALE, SPEED
 from cosmic.mico.gui.teleoperation_panel import TeleoperationPanel, make_teleoperation_panel
+from cosmic.mico.hw.sdl_virtual import VirtualGamepad
 from gui.mico.panels import show
 from unit.mico.rigs import mico
 
@@ -114,6 +115,40 @@ def test_a_loss_is_said_in_words_and_steering_can_be_begun_again(qtbot, panel):
     assert panel.start.text() == "Start"
     panel.grab()
     begin(qtbot, panel)
+
+
+def test_what_is_no_longer_measured_is_no_longer_shown(qtbot, panel):
+    begin(qtbot, panel)
+    haptic(panel).move_hand(y=0.5)
+    teleoperation(panel).feel({"y": -0.25})
+    qtbot.waitUntil(lambda: panel.force.text == "felt force 25 %")
+    with qtbot.waitSignal(panel.phase_changed, check_params_cb="stopped: unplugged".__eq__):
+        haptic(panel).unplug()
+    assert panel.force.text == "felt force 0 %"
+    assert panel.bars.axes == {}
+
+
+def test_nothing_takes_the_place_of_a_device_that_was_unplugged(qtbot, panel):
+    with VirtualGamepad() as pad:
+        panel.look_for_devices()
+        choose(panel, pad.key, "sticks")
+        title = panel.devices.currentText()
+        pad.unplug()
+        panel.look_for_devices()
+        assert panel.devices.currentText() == ""
+        assert not panel.start.isEnabled()
+        assert title in panel.start.toolTip()
+    with VirtualGamepad():
+        panel.look_for_devices()
+        assert panel.devices.currentText() == title
+        assert panel.start.isEnabled()
+
+
+def test_a_device_without_the_inputs_of_the_profile_is_refused(qtbot, panel):
+    choose(panel, HAPTIC, "sticks")
+    press_start(qtbot, panel)
+    assert "has none of the inputs of profile 'sticks', left_x, left_y" in panel.message.text()
+    assert panel.indicator.words == "off"
 
 
 def test_a_window_out_of_focus_pauses(qtbot, panel, monkeypatch):

@@ -7,6 +7,7 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QApplication
 
+from cosmic.vico.gui.ink import GREEN, ORANGE
 from cosmic.vico.hw.interface import Roi
 
 
@@ -192,6 +193,32 @@ def test_a_drag_aims_and_the_tool_moves_to_where_the_button_is_let_go(
     assert aimed[-1][0] is None
     ((_, place, what),) = camera.calls
     assert (place, what) == (pytest.approx((300.0, 200.0), abs=1.0), "right gripper")
+
+
+def colours_around(view, point_px) -> set[str]:
+    """Return the colours on the screen within a few pixels of a pixel of the image."""
+    there = view.view.to_screen.map(QPointF(*point_px)).toPoint()
+    shot = view.view.grab().toImage()
+    near = range(-4, 5)
+    return {
+        shot.pixelColor(there + QPoint(across, down)).name().upper()
+        for across in near
+        for down in near
+    }
+
+
+def test_a_drag_shows_where_the_tool_would_stand(qtbot, shown, mouse, camera) -> None:
+    place = (300.0, 200.0)
+    before = colours_around(shown, place)
+    shown.ghost.aim(place, width_px=40.0)
+    shown.view.redraw()
+    assert GREEN.name().upper() in colours_around(shown, place) - before
+    shown.ghost.show_answer("the plate is in the way", allowed=False)
+    shown.view.redraw()
+    assert ORANGE.name().upper() in colours_around(shown, place) - before
+    shown.ghost.aim(None)
+    shown.view.redraw()
+    assert colours_around(shown, place) == before
 
 
 def test_the_wheel_with_ctrl_changes_the_height_and_not_the_zoom(qtbot, shown, camera) -> None:

@@ -22,14 +22,14 @@ from cosmic.vico.hw.interface import CameraSettings, Roi
         (MoveTo(-5050.0, "um"), "moves to -5050.0 um"),
         (MoveBy(20.0, "deg"), "moves by +20.0 deg"),
         (Step(-100, 80.0, 1000), "makes -100 steps of 80 V"),
-        (Jog(1, 200.0), "jogs up at 200 a second"),
-        (Steer(-1, 40.0, 0.1), "is steered down at 40 a second"),
+        (Jog(1, 200.0), "jogs right at 200 um/s"),
+        (Steer(-1, 40.0, 0.1), "is steered left at 40 um/s"),
         (Calibrate(), "calibrates its sensor"),
         (Reference(), "looks for its reference"),
     ],
 )
 def test_a_movement_is_a_sentence(motion: Motion, text: str) -> None:
-    assert motion_text(motion) == text
+    assert motion_text(motion, directions=("right", "left"), speed_unit="um/s") == text
 
 
 def test_settings_of_a_camera_are_read_by_people() -> None:

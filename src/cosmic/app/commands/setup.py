@@ -32,6 +32,7 @@ _FAR: Final = 1e6
 _MADE_UP: Final = re.compile(r"device(\d+)\.channel(\d+)")
 """Name of an axis that was found and is not configured."""
 _GUESS: Final = "[G] around where it stood; widen them when its body is in the scene"
+_NOT_READ: Final = "[G] around 0: where it stands was not read; cosmic setup reads it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +43,8 @@ class FoundAxis:
     ----------
     name : str
         What its entry calls it, until somebody knows better.
-    position : float
-        Where it stands, in `unit`.
+    position : float or None
+        Where it stands, in `unit`; None: not read yet.
     """
 
     name: str
@@ -51,7 +52,7 @@ class FoundAxis:
     channel: int
     kind: str
     unit: AxisUnit
-    position: float = 0.0
+    position: float | None = None
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -96,7 +97,7 @@ def found_axes(path: Path) -> tuple[list[FoundAxis], tuple[Serial, ...]]:
 
 
 def unnamed_axes(mico: Mico, configured: Container[str]) -> list[FoundAxis]:
-    """Return the axes that were found and that nobody has named, where they stand."""
+    """Return the axes that were found and that nobody has named; no position is read of them."""
     found: list[FoundAxis] = []
     for name in mico.names:
         place = _MADE_UP.fullmatch(name)
@@ -126,7 +127,7 @@ def _looked_at(path: Path, found: Sequence[FoundAxis], *, move: bool) -> Iterato
                 here = replace(each, position=position or 0.0)
                 sys.stdout.write(
                     f"device {here.device} channel {here.channel}: {here.kind}, position "
-                    f"{here.position:.1f} {here.unit}\n"
+                    f"{position or 0.0:.1f} {here.unit}\n"
                 )
                 if move:
                     _nudge(rig, here)
@@ -210,8 +211,9 @@ def _append(
         entry["channel"] = each.channel
         entry["kind"] = each.kind
         reach = ROOM[each.unit] if room is None else room
-        limits = tomlkit.item([round(each.position - reach, 1), round(each.position + reach, 1)])
-        limits.comment(_GUESS)
+        here = each.position or 0.0
+        limits = tomlkit.item([round(here - reach, 1), round(here + reach, 1)])
+        limits.comment(_GUESS if each.position is not None else _NOT_READ)
         entry[f"limits_{each.unit}"] = limits
         listed.append(entry)
 

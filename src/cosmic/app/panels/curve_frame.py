@@ -4,7 +4,7 @@ from abc import abstractmethod
 
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent
-from PySide6.QtGui import QFontMetricsF
+from PySide6.QtGui import QFont, QFontMetricsF, QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from cosmic.frame.gui.palette import Palette
@@ -13,6 +13,12 @@ from cosmic.frame.overrides import override
 
 _GAP_PX = 2
 _AROUND_PX = 8
+_ROOMY = 14.0
+"""Heights of a figure from which on fields stand apart; lower ones need that room themselves."""
+
+
+def _tick_font() -> QFont:
+    return number_font(11)
 
 
 class CurveFrame(QWidget):
@@ -80,7 +86,7 @@ class CurveFrame(QWidget):
         for axis, name in self._names.items():
             axis.setPen(palette.border_strong)
             axis.setTextPen(palette.text)
-            axis.setStyle(tickFont=number_font(11), tickLength=4)
+            axis.setStyle(tickFont=_tick_font(), tickLength=4)
             axis.setLabel(name, color=palette.dim)
         self._fit_names()
         self._colour(palette)
@@ -104,9 +110,21 @@ class CurveFrame(QWidget):
             if text != axis.labelText:
                 axis.setLabel(text, color=current_palette().dim)
 
+    def _keep_figures_apart(self) -> None:
+        """Leave room for the figures at the ends of two fields, which lie half outside them."""
+        figure_px = QFontMetricsF(_tick_font()).height()
+        gap_px = figure_px if self.height() >= _ROOMY * figure_px else _GAP_PX
+        for row in range(len(self._boxes) - 1):
+            self._layout.layout.setRowSpacing(row, gap_px)
+
     @abstractmethod
     def _colour(self, palette: Palette) -> None:
         """Give what is drawn in the fields its colours."""
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._keep_figures_apart()
 
     @override
     def changeEvent(self, event: QEvent) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Final
 
@@ -10,11 +11,13 @@ from PySide6.QtGui import QGuiApplication, QHideEvent, QShowEvent
 from PySide6.QtWidgets import QGridLayout, QLabel, QVBoxLayout, QWidget
 
 from cosmic.app.commands.setup import entries, unnamed_axes
+from cosmic.app.configuration.axes_seen import note_axes
 from cosmic.app.rig import Rig
 from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.autonomy.stage_check import StageReport
-from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.gui.build import named, push_button
+from cosmic.frame.gui.key_focus import set_shown, set_usable
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State
 from cosmic.frame.kept_file import write_whole
@@ -58,12 +61,15 @@ class DayStep:
     look : callable
         Returns how far it is.
     act : callable
-        What its button does.
+        What its button does; text that it returns is shown.
+    cancel : callable or None
+        Ends what runs; None: it ends by itself, and soon.
     """
 
     title: str
     look: Callable[[], Standing]
     act: Callable[[], object]
+    cancel: Callable[[], object] | None = None
 
 
 class FirstDaySteps:
@@ -77,6 +83,8 @@ class FirstDaySteps:
         Returns where the report on the axes goes; may raise `OSError`.
     click : callable
         Shows the image with a click that moves the tool.
+    config : Path or None
+        The platform file, where what is found of axes is noted; None: nowhere.
     """
 
     def __init__(
@@ -90,7 +98,9 @@ class FirstDaySteps:
         camera: Callable[[], CameraHandle],
         folder: Callable[[], Path],
         click: Callable[[], object],
+        config: Path | None = None,
     ) -> None:
+        self._config = config
         self._rig, self._gui, self._configured, self._force = rig, gui, configured, force
         self._tool, self._camera, self._folder, self._click = tool, camera, folder, click
         self._calibrating: Task | None = None
@@ -103,14 +113,14 @@ class FirstDaySteps:
         """All of them, in order."""
         rig = self._rig
         return (
-            DayStep("Devices", self.devices, self._gui.rescan),
+            DayStep("Devices", self.devices, lambda: self._gui.mico.rescan(wait=False)),
             DayStep("Names", self.names, self.copy_entries),
-            DayStep("Positions", self.positions, self._gui.initialise),
+            DayStep("Positions", self.positions, self.initialise, self.cancel_initialisation),
             *((DayStep("Force", self.force, rig.daqco.start),) if self._force else ()),
             DayStep("Camera", self.camera, lambda: self._camera().start()),
-            DayStep("Lens", self.lens, self.home_lens),
-            DayStep("Scale and rotation", self.scale, self.calibrate),
-            DayStep("Know your stage", self.stage, self.check_stage),
+            DayStep("Lens", self.lens, self.home_lens, self.abort_lens),
+            DayStep("Scale and rotation", self.scale, self.calibrate, self.cancel_calibration),
+            DayStep("Know your stage", self.stage, self.check_stage, self.cancel_check),
             DayStep("First click-to-move", self.click, self._click),
         )
 
@@ -121,11 +131,14 @@ class FirstDaySteps:
             return Standing(State.ERROR, f"{mico.failure}. Check power and cable.", "Rescan")
         if not mico.ready:
             return Standing(State.BUSY, "Looking for devices")
-        absent = [axis.key for axis in mico if not axis.details.present]
+        # What nobody has named is not used, and counts as absent there.
+        own = [axis for axis in mico if axis.key in self._configured]
+        absent = [axis.key for axis in own if not axis.details.present]
         if absent:
-            text = f"{len(absent)} axes of the platform file do not answer: {', '.join(absent)}"
+            of = f"{len(absent)} of {len(own)} axes"
+            text = f"{of} of the platform file do not answer: {', '.join(absent)}"
             return Standing(State.ERROR, text, "Rescan")
-        return Standing(State.OK, f"{len(list(mico))} axes answer", "Rescan")
+        return Standing(State.OK, f"{len(own)} axes answer", "Rescan")
 
     def names(self) -> Standing:
         """Look for axes that nobody has named."""
@@ -135,18 +148,38 @@ class FirstDaySteps:
         if not found:
             return Standing(State.OK, "Every axis has a name and a place")
         text = (
-            f"{len(found)} axes have no entry in the platform file. Copy entries, name and limit "
-            "them there; cosmic setup --write does the same"
+            f"Without entry in the platform file: {', '.join(each.name for each in found)}. Copy "
+            "entries, name and limit them there; cosmic setup --write does the same"
         )
         return Standing(State.UNKNOWN, text, "Copy entries")
 
-    def copy_entries(self) -> None:
+    def copy_entries(self) -> str:
         """Put the entries for axes without a name into the clipboard."""
         found = unnamed_axes(self._gui.mico, self._configured)
         QGuiApplication.clipboard().setText(entries(found))
+        return "Entries copied: paste them into the platform file, then start again"
+
+    @property
+    def _initialising(self) -> Task | None:
+        """What drives all axes now; none of its own counts while devices are looked for."""
+        task = self._gui.mico.application.running_task
+        return task if task is not None and not task.done and self._gui.mico.ready else None
+
+    def initialise(self) -> None:
+        """Begin the initialisation sequence."""
+        if why := self._gui.busy:
+            raise NotAvailable(why)
+        self._gui.initialise()
+
+    def cancel_initialisation(self) -> None:
+        """End the initialisation sequence; what moves is stopped."""
+        _cancel(self._initialising)
 
     def positions(self) -> Standing:
         """Look at what is known of the positions."""
+        running = self._initialising
+        if running is not None:
+            return Standing(State.BUSY, running.progress.text or running.title)
         unknown = [
             axis.key
             for axis in self._gui.mico
@@ -167,7 +200,8 @@ class FirstDaySteps:
         armed = [each.settings.channel for each in daqco.limits if each.settings.armed]
         channels = ", ".join(daqco.channels)
         if not armed:
-            return Standing(State.UNKNOWN, f"{channels} are measured; no limit is armed")
+            text = f"{channels} are measured; no limit is armed. Set one in Measure, Limit…"
+            return Standing(State.UNKNOWN, text)
         return Standing(
             State.OK, f"{channels} are measured; a limit of {', '.join(armed)} is armed"
         )
@@ -200,6 +234,11 @@ class FirstDaySteps:
         if self._rig.vico.lens is not None:
             self._rig.vico.lens.home()
 
+    def abort_lens(self) -> None:
+        """Stop both motors."""
+        if self._rig.vico.lens is not None:
+            self._rig.vico.lens.abort()
+
     def scale(self) -> Standing:
         """Look at the calibration of the camera."""
         running = self._calibrating
@@ -217,17 +256,44 @@ class FirstDaySteps:
         """Measure scale and rotation by moving the tool."""
         self._calibrating = self._rig.vico.calibrate_stage(self._tool(), self._camera().name)
 
+    def cancel_calibration(self) -> None:
+        """End the calibration; the tool stays where it is then."""
+        _cancel(self._calibrating)
+
     def stage(self) -> Standing:
         """Look at what is known of the axes."""
         if self._check is not None and not self._check.done:
             return Standing(State.BUSY, self._check.progress.text or "Checking the axes")
         found = self._checking
         if found is None:
-            text = f"Moves the {self._tool()} to positions from both sides and looks at its tip"
-            return Standing(State.UNKNOWN, text, "Check axes")
+            return self._known_stage() or Standing(
+                State.UNKNOWN,
+                f"Moves the {self._tool()} to positions from both sides and looks at its tip; what "
+                "is found is noted in the platform file",
+                "Check axes",
+            )
         if found.failure is not None:
             return Standing(State.ERROR, f"The last check failed: {found.failure}", "Check axes")
         return Standing(State.OK, f"{found.result.text}\n{self._report}", "Check axes")
+
+    def _known_stage(self) -> Standing | None:
+        """Return what the platform file has of the axes of the tool; None where it has nothing."""
+        carrying = self._axes_of(self._tool())
+        lines = [
+            f"{each.name} repeats within {each.repeatability_um:.2f} µm, "
+            f"backlash {each.backlash_um or 0.0:+.2f} µm"
+            for each in self._gui.mico.settings.positioner
+            if each.name in carrying and each.repeatability_um is not None
+        ]
+        if not lines:
+            return None
+        return Standing(State.OK, "\n".join([*lines, "As the platform file has it"]), "Check axes")
+
+    def _axes_of(self, tool: str) -> tuple[str, ...]:
+        try:
+            return self._gui.mico.tools[tool].axes
+        except CosmicError:  # without a scene nothing tells what carries it
+            return ()
 
     def check_stage(self) -> None:
         """Begin to measure the axes of the tool by the camera."""
@@ -238,6 +304,10 @@ class FirstDaySteps:
         self._check, self._checking = transform.check_stage(self._tool(), self._camera().name)
         self._checking.add_callback(self._keep)
 
+    def cancel_check(self) -> None:
+        """End the check of the axes; the tool stays where it is then."""
+        _cancel(self._check)
+
     def _keep(self, found: Operation[StageReport]) -> None:
         if found.failure is not None:
             return
@@ -247,7 +317,17 @@ class FirstDaySteps:
         except OSError as exc:
             self._report = f"not kept: {exc}"
         else:
-            self._report = f"written: {path}"
+            self._report = f"written: {path}\n{self._note(found.result)}"
+
+    def _note(self, report: StageReport) -> str:
+        """Note what was found in the platform file; return what became of it."""
+        if self._config is None:
+            return "Not noted in a platform file: there is none of your own"
+        try:
+            note_axes(self._config, report, f"{datetime.now().astimezone():%Y-%m-%d}")
+        except (ConfigError, OSError) as exc:
+            return f"Not noted in the platform file: {exc}"
+        return f"noted: {self._config}"
 
     def click(self) -> Standing:
         """Look at whether a click can move the tool."""
@@ -255,6 +335,11 @@ class FirstDaySteps:
         if problem:
             return Standing(State.UNKNOWN, "After scale and rotation")
         return Standing(State.OK, f"Click into the image: the {self._tool()} goes there", "Try it")
+
+
+def _cancel(running: Task | None) -> None:
+    if running is not None:
+        running.cancel()
 
 
 class FirstDayPanel(QWidget):
@@ -271,7 +356,7 @@ class FirstDayPanel(QWidget):
     def __init__(self, steps: Sequence[DayStep], parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("firstDay")
-        self.rows = {step.title: _Row(step, self._attempt) for step in steps}
+        self.rows = {step.title: _Row(step, self, self._attempt) for step in steps}
         self.message = named(QLabel(), "firstDayMessage")
         self.message.setWordWrap(True)
         grid = QGridLayout()
@@ -293,14 +378,14 @@ class FirstDayPanel(QWidget):
         for row in self.rows.values():
             row.refresh()
 
-    def _attempt(self, step: DayStep) -> None:
+    def _attempt(self, step: DayStep, act: Callable[[], object]) -> None:
         try:
-            step.act()
+            said = act()
         except CosmicError as exc:
             self.message.setText(f"{step.title}: {exc}")
             self.refused.emit(str(exc))
         else:
-            self.message.setText("")
+            self.message.setText(said if isinstance(said, str) else "")
         self.refresh()
 
     @override
@@ -318,8 +403,13 @@ class FirstDayPanel(QWidget):
 class _Row:
     """The widgets of one step."""
 
-    def __init__(self, step: DayStep, attempt: Callable[[DayStep], None]) -> None:
-        self._step = step
+    def __init__(
+        self,
+        step: DayStep,
+        owner: QWidget,
+        attempt: Callable[[DayStep, Callable[[], object]], None],
+    ) -> None:
+        self._step, self._owner, self._attempt, self._act = step, owner, attempt, step.act
         self.badge = StateBadge()
         self.title = QLabel(step.title)
         self.text = QLabel()
@@ -328,7 +418,7 @@ class _Row:
         place = self.button.sizePolicy()
         place.setRetainSizeWhenHidden(True)  # no row moves while another one is clicked
         self.button.setSizePolicy(place)
-        self.button.clicked.connect(lambda: attempt(step))
+        self.button.clicked.connect(lambda: self._attempt(step, self._act))
 
     def refresh(self) -> None:
         standing = self._step.look()
@@ -336,7 +426,11 @@ class _Row:
         text = with_micro_signs(standing.text)
         if self.text.text() != text:
             self.text.setText(text)
-        self.button.setVisible(bool(standing.button))
-        if standing.button and self.button.text() != standing.button:
-            self.button.setText(standing.button)
-        self.button.setEnabled(standing.state is not State.BUSY)
+        busy = standing.state is State.BUSY
+        cancel = self._step.cancel if busy else None
+        self._act = self._step.act if cancel is None else cancel
+        words = standing.button if cancel is None else "Cancel"
+        set_shown(self.button, self._owner, shown=bool(words))
+        if words and self.button.text() != words:
+            self.button.setText(words)
+        set_usable(self.button, self._owner, usable=cancel is not None or not busy)

@@ -190,6 +190,9 @@ class OperationCard(QFrame):
         self._fit()
 
     def _show_values(self, values: tuple[tuple[str, str], ...]) -> None:
+        if len(values) > _MOST_VALUES:
+            more = len(values) - _MOST_VALUES + 1
+            values = (*values[: _MOST_VALUES - 1], (f"and {more} more", ""))
         for number, (name, value) in enumerate(self._values):
             shown = number < len(values)
             name.setVisible(shown)

@@ -259,13 +259,21 @@ class RecorderPanel(QWidget):
     def edit(self) -> None:
         """Ask for the numbers of the step that is chosen, where it has some."""
         row = self.list.currentRow()
-        asked = {(row, key): found for key, found in _asked(self._steps[row]).items()}
+        step = self._steps[row]
+        asked = {(row, key): found for key, found in _asked(step).items()}
         if asked:
             dialog = self._asking("Change the step", asked)
-            dialog.accepted.connect(lambda: self._on_edited(row, dialog.values))
+            dialog.accepted.connect(lambda: self._on_edited(step, dialog.values))
 
-    def _on_edited(self, row: int, values: dict[tuple[int, str], float]) -> None:
-        procedure = self._given(self.procedure, values)
+    def _on_edited(self, step: "RecordedStep", values: dict[tuple[int, str], float]) -> None:
+        # The list can be changed while the numbers are asked for.
+        row = next((at for at, each in enumerate(self._steps) if each is step), None)
+        if row is None:
+            look = state_look(State.REFUSED)
+            self.say(f"{look.glyph} {step.words} is no longer in the list; nothing was changed")
+            return
+        here = {(row, key): value for (_, key), value in values.items()}
+        procedure = self._given(self.procedure, here)
         if procedure is not None:
             self._put(list(procedure.step), row)
 
@@ -396,6 +404,10 @@ class RecorderPanel(QWidget):
     def _on_values(
         self, procedure: "RecordedProcedure", values: dict[tuple[int, str], float]
     ) -> None:
+        if self.procedure != procedure:
+            look = state_look(State.REFUSED)
+            self.say(f"{look.glyph} the steps were changed meanwhile; press Replay again")
+            return
         given = self._given(procedure, values)
         if given is not None:
             self.replay_requested.emit(given)

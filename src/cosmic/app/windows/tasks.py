@@ -380,6 +380,7 @@ class TaskLayout(QObject):
             camera=lambda: self.central_view.camera.camera,
             folder=self.folder,
             click=self._try_click,
+            config=self._platform.path,
         ).steps
 
     def _tool_in_the_image(self) -> str:

@@ -38,7 +38,7 @@ def replay_on(
     gripper = gripper_of(procedure, handling)
     built = build_recorded(procedure, handling.context(gripper), around)
     operations = tuple(each.operation for each in procedure.step if isinstance(each, OperationStep))
-    run = handling.prepare_recorded(built, gripper, operations)
+    run = handling.prepare_recorded(built, gripper, operations, values=procedure.given)
 
     def close() -> None:
         if run.over:

@@ -263,6 +263,15 @@ class RecordedProcedure(StrictModel):
             for key, words in step.ask.items()
         }
 
+    @property
+    def given(self) -> tuple[tuple[str, str], ...]:
+        """What a replay asks for, as it is read: step and quantity, the value with its unit."""
+        found = []
+        for (number, key), (_, value) in self.asked.items():
+            quantity, _, unit = NUMBERS.get(key, key).partition(", ")
+            found.append((f"step {number + 1}, {quantity}", f"{value:g} {unit}".strip()))
+        return tuple(found)
+
     def with_values(self, values: dict[tuple[int, str], float]) -> "RecordedProcedure":
         """Return it with other values for what is asked; raises `ConfigError`."""
         steps = [each.model_dump(mode="json") for each in self.step]

@@ -368,6 +368,8 @@ class FibreHandling:
         procedure: Procedure[HandlingContext],
         gripper: str,
         operations: tuple[SingleOperation, ...] = (),
+        *,
+        values: tuple[tuple[str, str], ...] = (),
     ) -> ProcedureRun[HandlingContext]:
         """Return the run of a procedure of many steps on the context of a gripper.
 
@@ -375,6 +377,8 @@ class FibreHandling:
         ----------
         operations : tuple of SingleOperation
             Those among its steps, for `UNDO` to know what was done.
+        values : tuple of (str, str)
+            What it was given, a name and a value each, for its result.
 
         Raises
         ------
@@ -395,7 +399,9 @@ class FibreHandling:
             work.mico = self._rig.mico
             work.shared.surveyed = False
             self._state.gripper, self._state.request = gripper, None
-            return self._made(procedure, work, lambda run: self._on_replayed(run, operations))
+            return self._made(
+                procedure, work, lambda run: self._on_replayed(run, operations, values)
+            )
 
     def _made(
         self,
@@ -527,19 +533,23 @@ class FibreHandling:
             self._state.changed.emit()
 
     def _on_replayed(
-        self, run: ProcedureRun[HandlingContext], operations: tuple[SingleOperation, ...]
+        self,
+        run: ProcedureRun[HandlingContext],
+        operations: tuple[SingleOperation, ...],
+        values: tuple[tuple[str, str], ...],
     ) -> None:
         if run.failure is None:
             self._state.done = []
             for each in operations:
                 self._note_done(each)
             text = "Every step was carried out."
-            result = OperationResult(f"Replay {run.name}", good=True, text=text)
+            result = OperationResult(f"Replay {run.name}", good=True, text=text, values=values)
         else:
             result = OperationResult(
                 f"Replay {run.name}",
                 good=False,
                 text=self._failed(run),
+                values=values,
                 interrupted=interruption(run),
             )
         self._end(result)

@@ -85,7 +85,8 @@ class OperationResult:
     text : str
         A sentence: what was found, or why it was refused or failed.
     values : tuple of (str, str)
-        What was measured: a name, and the value with its 95 % interval and unit.
+        What was measured: a name, and the value with its 95 % interval and unit; of a replay, what
+        it was given.
     interrupted : str
         "stopped" by the stop, "ended" by whoever watched over it, or "in doubt" where the jaws were
         opened by no operation; empty where it was none of them.

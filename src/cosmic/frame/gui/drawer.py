@@ -65,7 +65,6 @@ class Drawer(QWidget):
         column.setContentsMargins(STEP_PX // 2, STEP_PX // 2, STEP_PX // 2, 0)
         column.addWidget(self._stack)
         self._body.hide()
-        window.installEventFilter(self)
 
     def add_page(self, title: str, page: QWidget, tip: str) -> None:
         """Add a page with its button."""
@@ -102,6 +101,8 @@ class Drawer(QWidget):
         if title:
             self._stack.setCurrentWidget(self._pages[title])
             self._lay_over()
+            # Only while it is open: every event of the window comes by, and waits for Python.
+            self._window.installEventFilter(self)
             self._body.show()
             self._body.raise_()
             entry = self._pages[title].focusProxy()
@@ -111,6 +112,7 @@ class Drawer(QWidget):
             focused = self._window.focusWidget()
             if focused is not None and self._body.isAncestorOf(focused):
                 self._window.setFocus()  # Qt would give it to the next widget: Space presses it
+            self._window.removeEventFilter(self)
             self._body.hide()
         self.opened.emit(title)
 
@@ -133,6 +135,6 @@ class Drawer(QWidget):
 
     @override
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if watched is self._window and event.type() == QEvent.Type.Resize and self._open:
+        if watched is self._window and event.type() == QEvent.Type.Resize:
             self._lay_over()
         return super().eventFilter(watched, event)

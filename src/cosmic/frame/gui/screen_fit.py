@@ -119,7 +119,3 @@ class FittedPanel(QScrollArea):
     @override
     def sizeHint(self) -> QSize:
         return self._panel.sizeHint()
-
-    @override
-    def minimumSizeHint(self) -> QSize:
-        return _LEAST

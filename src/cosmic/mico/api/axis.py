@@ -519,7 +519,14 @@ class Axis(PlanMovable, Declared):
         )
         return self._result(self._sent(motion, consent=consent), wait=wait)
 
-    def jog(self, direction: int, speed: Number | None = None, *, consent: bool = False) -> Jogging:
+    def jog(
+        self,
+        direction: int,
+        speed: Number | None = None,
+        *,
+        consent: bool = False,
+        source: str = "",
+    ) -> Jogging:
         """Move on and on until it is let go, not renewed for a quarter second, or at a limit.
 
         Parameters
@@ -529,6 +536,8 @@ class Axis(PlanMovable, Declared):
         speed : float or str
             In `unit` per second, or such as "5 um/s"; in Hz for an axis without sensor; the
             configured one if None.
+        source : str
+            Who commands, for the log; who made this object where it is empty.
 
         Raises
         ------
@@ -548,7 +557,7 @@ class Axis(PlanMovable, Declared):
                 f"not {wanted:g} in direction {direction}"
             )
             raise refusal(refuse(Reason.NOT_FINITE, text, axis=self._name))
-        return self._jogging(Jog(direction, wanted), consent=consent)
+        return self._jogging(Jog(direction, wanted), consent=consent, source=source)
 
     def steer(
         self, velocity: Number, *, dead_man_s: float, consent: bool = False, source: str = ""

@@ -20,6 +20,7 @@ Text = Annotated[str, Field(min_length=1)]
 
 
 _COUNTED: Final = ("travel_um", "step_std", "end_std_um")
+_SEEN: Final = ("repeatability_um", "backlash_um")
 
 
 class MotionDefaults(StrictModel):
@@ -126,6 +127,8 @@ class PositionerSettings(StrictModel):
     travel_um: Range | None = None
     step_std: Annotated[float, Field(ge=0, le=0.3)] | None = None
     end_std_um: Annotated[float, Field(ge=0)] | None = None
+    repeatability_um: Annotated[float, Field(ge=0)] | None = None
+    backlash_um: float | None = None
     forward_text: Text = "+"
     backward_text: Text = "-"
     forward_key: str = ""
@@ -164,7 +167,7 @@ class PositionerSettings(StrictModel):
     @model_validator(mode="after")
     def _units_fit(self) -> Self:
         allowed = {
-            "linear": {"limits_um", "start_um", "start_region_um"},
+            "linear": {"limits_um", "start_um", "start_region_um", *_SEEN},
             "rotary": {"limits_deg", "start_deg", "start_region_deg"},
             "open-loop": {"start_um", "step_um", *_COUNTED},
         }[self.kind]
@@ -176,6 +179,7 @@ class PositionerSettings(StrictModel):
             "start_deg",
             "step_um",
             *_COUNTED,
+            *_SEEN,
             *regions,
         ):
             if getattr(self, key) is not None and key not in allowed:

@@ -20,7 +20,7 @@ from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State
 from cosmic.mico.core.motion.orders import LARGEST_STEPS
-from cosmic.mico.core.motion.positioner import PositionerState
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.core.settings import MotionDefaults
 from cosmic.mico.gui.card import CONFIDENCE, PositionDisplay
 from cosmic.mico.gui.detour_request import Goal
@@ -114,7 +114,8 @@ class AxisRow(QObject):
     def show_state(self, state: PositionerState) -> None:
         """Show the newest state of the axis."""
         self._state = state
-        self.position.show_position(state.shown_position)
+        known = state.confidence is not Confidence.UNKNOWN
+        self.position.show_position(state.shown_position, known=known)
         text, _tone, tip = CONFIDENCE[state.confidence]
         if self.confidence.toolTip() != tip:
             self.confidence.setText(text.split(" ")[0])

@@ -117,8 +117,9 @@ class PositionDisplay(QWidget):
         """The figures shown."""
         return self._figures.text()
 
-    def show_position(self, position: float | None) -> None:
-        """Show `position`, from the user's zero; a dash while there is none."""
+    def show_position(self, position: float | None, *, known: bool = True) -> None:
+        """Show `position`, from the user's zero, in grey where it is not known; a dash for none."""
+        self._figures.setEnabled(known)
         text = "–" if position is None else format_quantity(position, self._unit).split(" ")[0]
         if text != self._figures.text():
             self._figures.setText(text)

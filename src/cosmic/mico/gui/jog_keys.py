@@ -80,7 +80,7 @@ class JogKeys(QObject):
         commands.abandon_series()
         self._lost.pop(key, None)
         try:
-            running = axis.jog(jog.direction, self._speed(axis.kind))
+            running = axis.jog(jog.direction, self._speed(axis.kind), source="key")
         except CosmicError as exc:
             commands.refused.emit(None, str(exc))
             return

@@ -15,7 +15,7 @@ from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look, ui_font
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.positioner import PositionerState, Status
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState, Status
 from cosmic.mico.core.settings import MotionDefaults, PositionerSettings
 from cosmic.mico.gui.axis_commands import AxisCommands
 from cosmic.mico.gui.card import Card, ConfidenceMark, PositionDisplay
@@ -231,7 +231,8 @@ class PositionerBaseGUI(Card):
         self._state = state
         self.commands.note_state(state)
         self._show_badge(STATES[state.status], state.error or self._activity_text(state))
-        self._position.show_position(state.shown_position)
+        known = state.confidence is not Confidence.UNKNOWN
+        self._position.show_position(state.shown_position, known=known)
         self._confidence.set_confidence(state.confidence, state.std)
         self._show_usable(state)
         self._show_line(state)

@@ -179,7 +179,7 @@ class TeleoperationPanel(QWidget):
         self.fine_share = self.fine.share
         self.message = ElidedLabel()
         self.keys = SteeringKeys(self._app, self._teleoperation.sources.keys.keyboard, self)
-        self._words = ""
+        self._words = self._missing = ""
         self._arrange()
         self._connect()
         self._show_profiles()
@@ -222,6 +222,7 @@ class TeleoperationPanel(QWidget):
     def _connect(self) -> None:
         self.start.clicked.connect(self._on_start)
         self.as_configured.clicked.connect(lambda: self._edit(self._teleoperation.reset_profile))
+        self.devices.activated.connect(self._on_device_chosen)
         self.profiles.currentIndexChanged.connect(self._on_profile_chosen)
         self.table.changed.connect(self._on_table_changed)
         self.table.refused.connect(self._say)
@@ -245,12 +246,25 @@ class TeleoperationPanel(QWidget):
             for number in range(self.devices.count())
         ]
         if entries != shown:
-            chosen = self.devices.currentData()
+            chosen, title = self.devices.currentData(), self.devices.currentText() or self._missing
             with QSignalBlocker(self.devices):
                 self.devices.clear()
                 for text, key in entries:
                     self.devices.addItem(text, key)
-                self.devices.setCurrentIndex(max(0, self.devices.findData(chosen)))
+                self.devices.setCurrentIndex(self._same_device(chosen, title))
+        self._allow()
+
+    def _same_device(self, key: str | None, title: str) -> int:
+        """Return where a device is now, by its key or else its title; -1 while it is missing.
+
+        Nothing takes its place by itself: Start would begin to steer with another one.
+        """
+        at = max(self.devices.findData(key), self.devices.findText(title) if title else 0)
+        self._missing = title if at < 0 else ""
+        return at
+
+    def _on_device_chosen(self) -> None:
+        self._missing = ""
         self._allow()
 
     def _show_what_runs(self, state: TeleoperationState) -> None:
@@ -290,7 +304,7 @@ class TeleoperationPanel(QWidget):
         self.start.setText("Stop" if running else "Start")
         self.devices.setEnabled(not running)
         self.profiles.setEnabled(not running)
-        ready = bool(self.devices.count() and self.profiles.count())
+        ready = bool(self.devices.currentIndex() >= 0 and self.profiles.count())
         self.start.setEnabled(running or ready)
         if running:
             tip = "End the steering: everything it moves stops"
@@ -298,6 +312,8 @@ class TeleoperationPanel(QWidget):
             tip = "Start steering. Release all sticks; motion starts afterwards"
         elif not self.profiles.count():
             tip = "Not available: the platform file has no teleoperation profile"
+        elif self._missing:
+            tip = f"Not available: plug in {self._missing}, or choose another device"
         else:
             tip = "Not available: no input device is plugged in"
         self.start.setToolTip(tip)
@@ -335,11 +351,11 @@ class TeleoperationPanel(QWidget):
         self._on_attention()
         state = self._teleoperation.state
         self.indicator.show_phase(state.phase, state.words)
-        self.bars.show_inputs(state.inputs)
-        self.force.show_force(state.force, state.slowed)
+        running = self._running(state)
+        self.bars.show_inputs(state.inputs if running else None)
+        self.force.show_force(*((state.force, state.slowed) if running else (0.0, 1.0)))
         self.fine.show_pace(fine=state.fine)
         self.table.show_state(state)
-        running = self._running(state)
         rates = f"read {state.poll_hz:.0f} Hz, sent {state.command_hz:.0f} Hz"
         self.rates.set_text(rates if running else "")
         device = state.device

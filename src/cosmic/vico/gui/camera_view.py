@@ -127,6 +127,7 @@ class CameraView(QWidget):
             self.seen,
             self.mark,
             *self.tools.layers,
+            self.ghost,
             *corners,
             self.note,
         ]

@@ -132,6 +132,7 @@ def test_the_script_is_python_whatever_the_procedure_and_its_steps_are_called(
 
 def test_a_replay_asks_for_what_is_marked_and_takes_other_values() -> None:
     assert EVERYTHING.asked == {(7, "force_un"): ("Force, µN", 50.0)}
+    assert EVERYTHING.with_values({(7, "force_un"): 20.0}).given == (("step 8, force", "20 µN"),)
     changed = EVERYTHING.with_values({(7, "force_un"): 30.0})
     assert changed.step[7].words == "Push to 30 µN"
     with pytest.raises(ConfigError, match="force_un"):

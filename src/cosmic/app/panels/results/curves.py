@@ -1,13 +1,15 @@
 """Curves of a recording over time or over a position, with two cursors and the moment shown."""
 
 from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, Qt, Signal
-from PySide6.QtGui import QMouseEvent
+from PySide6.QtGui import QColor, QMouseEvent
+from PySide6.QtWidgets import QGraphicsTextItem
 
 from cosmic.app.panels.curve_frame import CurveFrame
 from cosmic.app.results.timeline import Mark, Timeline, Track, Values
@@ -16,11 +18,14 @@ from cosmic.daqco.gui.colours import readable
 from cosmic.daqco.gui.plot.units import display_unit
 from cosmic.frame.errors import RecordingError
 from cosmic.frame.gui.palette import OKABE_ITO, Palette
+from cosmic.frame.gui.theme import number_font
 from cosmic.frame.overrides import override
 
 AXIS_PX: Final = 56
 MOST_POINTS: Final = 4000
 MOST_AXES: Final = 6
+_BETWEEN: Final = 40
+"""Opacity of what fills the field between the cursors, of 255."""
 _COLOURS: Final = ("orange", "sky blue", "bluish green", "reddish purple", "yellow", "vermillion")
 TIME: Final = "time"
 Line = tuple[str, str, Values, Values]
@@ -52,6 +57,8 @@ class ResultCurves(CurveFrame):
         self._curves: list[tuple[pg.PlotCurveItem, str]] = []
         self._flags: list[pg.InfiniteLine] = []
         self._lines: list[Line] = []
+        self._moved: list[tuple[str, str]] = []
+        self._keys = tuple(_key_in(box) for box in (self._upper, self._lower))
         self.cursors = pg.LinearRegionItem(movable=True)
         self.cursors.sigRegionChanged.connect(self.moved)
         self._nows = [pg.InfiniteLine(angle=90, movable=True) for _ in range(2)]
@@ -151,12 +158,14 @@ class ResultCurves(CurveFrame):
     def _show_lower(self, timeline: Timeline | None) -> None:
         """Draw how far the axes moved from where they were, each in its colour."""
         moved = timeline.moved[:MOST_AXES] if timeline is not None else ()
+        self._moved = []
         for number, each in enumerate(moved):
             if timeline is None:
                 break
             first = each.values[np.isfinite(each.values)][0]
             step = max(1, each.values.size // MOST_POINTS)
             colour = _COLOURS[(number + 1) % len(_COLOURS)]
+            self._moved.append((each.name, colour))
             times = (each.time_s - timeline.start_s)[::step]
             self._draw(self._lower, colour, times, (each.values - first)[::step])
         shown = bool(moved)
@@ -294,6 +303,32 @@ class ResultCurves(CurveFrame):
             line.setPen(pg.mkPen(palette.text, width=1.5))
             line.setHoverPen(pg.mkPen(palette.accent, width=2.5))
         self._dot.setBrush(palette.text)
+        between = QColor(palette.accent)
+        between.setAlpha(_BETWEEN)
+        self.cursors.setBrush(between)
+        for line in self.cursors.lines:
+            line.setPen(pg.mkPen(palette.accent, width=1.5))
+            line.setHoverPen(pg.mkPen(palette.text, width=2.5))
+        self._name_curves(palette.field)
+
+    def _name_curves(self, ground: str) -> None:
+        """Write into each field which curve is which, where that is not said beside it."""
+        forces = [(name, colour) for name, colour, _, _ in self._lines]
+        named = (forces if len(forces) > 1 else [], self._moved)
+        for key, entries in zip(self._keys, named, strict=True):
+            words = (
+                f'<span style="color:{readable(OKABE_ITO[colour])};background-color:{ground}">'
+                f"&nbsp;{escape(name)}&nbsp;</span>"
+                for name, colour in entries
+            )
+            key.setHtml("".join(words))
+
+
+def _key_in(box: pg.ViewBox) -> QGraphicsTextItem:
+    key = QGraphicsTextItem(box)
+    key.setFont(number_font(11))
+    key.setZValue(1.0)
+    return key
 
 
 def _thinned(where: Values, track: Track) -> tuple[Values, Values]:

@@ -356,6 +356,12 @@ class MotionMonitor:
             self._withdraw_query(replaced)
         return replaced
 
+    def _text(self, motion: Motion) -> str:
+        axis = self._positioner.settings
+        directions = axis.forward_text, axis.backward_text
+        unit = f"{axis.unit}/s" if self._positioner.has_sensor else "Hz"
+        return motion_text(motion, directions=directions, speed_unit=unit)
+
     def report_begun(self, order: Order, replaced: ActiveMove | None) -> None:
         """Report that `order` was sent, and that it ended the one before."""
         self._next_poll_s = self._context.clock.wall_s() + self._context.poll_s
@@ -372,7 +378,7 @@ class MotionMonitor:
                 self._context.reports.failed(self._name, over)
         # What goes on from an order reported already would fill the log.
         level = logging.INFO if order.follows is None else logging.DEBUG
-        logger.log(level, "%s %s, by %s", self._name, motion_text(order.motion), order.source)
+        logger.log(level, "%s %s, by %s", self._name, self._text(order.motion), order.source)
         if self.active is not None:
             self._context.reports.begun(
                 MovementBegun(

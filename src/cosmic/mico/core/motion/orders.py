@@ -93,8 +93,18 @@ MOTION_WORDS: Final[dict[type, str]] = {
 Motion = MoveTo | MoveBy | Step | Jog | Calibrate | Reference | ToEndStop
 
 
-def motion_text(motion: Motion) -> str:
-    """Return what an axis does, as the log says it: "moves to 120.0 um"."""
+def motion_text(
+    motion: Motion, *, directions: tuple[str, str] = ("up", "down"), speed_unit: str = ""
+) -> str:
+    """Return what an axis does, as the log says it: "moves to 120.0 um".
+
+    Parameters
+    ----------
+    directions : (str, str)
+        What going forward and backward is called for this axis, such as "right" and "left".
+    speed_unit : str
+        Of how fast it jogs: "um/s", "deg/s" or "Hz".
+    """
     match motion:
         case MoveTo():
             return f"moves to {motion.target:.1f} {motion.unit}"
@@ -104,7 +114,8 @@ def motion_text(motion: Motion) -> str:
             return f"makes {motion.steps:+d} steps of {motion.amplitude_v:g} V"
         case Jog():
             kind = "is steered" if isinstance(motion, Steer) else "jogs"
-            return f"{kind} {'up' if motion.direction > 0 else 'down'} at {motion.speed:g} a second"
+            towards = directions[0] if motion.direction > 0 else directions[1]
+            return f"{kind} {towards} at {motion.speed:g} {speed_unit}"
         case Calibrate():
             return "calibrates its sensor"
         case Reference():

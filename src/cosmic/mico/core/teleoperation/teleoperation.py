@@ -208,7 +208,8 @@ class Teleoperation:
         Raises
         ------
         NotAvailable
-            There is no such profile, motion is stopped, or MiCo is not ready.
+            There is no such profile, or the device has none of its inputs; motion is stopped, or
+            MiCo is not ready.
         NotConnectedError
             The device is not there.
         """
@@ -218,6 +219,7 @@ class Teleoperation:
             self._refuse_if_not_ready()
             opened = self.sources.open(device) if isinstance(device, str) else device
             try:
+                _refuse_if_nothing_steers(opened, chosen)
                 steering = self._steering(opened, chosen)
             except BaseException:
                 opened.close()
@@ -328,3 +330,14 @@ class Teleoperation:
         self._end_stops()
         self.stop()
         self.sources.close()
+
+
+def _refuse_if_nothing_steers(device: InputDevice, profile: TeleoperationProfileSettings) -> None:
+    """Refuse a device that would be armed and move nothing, whatever the hand does."""
+    wanted = [each.input for each in profile.axis]
+    there = device.info.axes
+    if there and wanted and not set(wanted) & set(there):
+        raise NotAvailable(
+            f"{device.info.title} has none of the inputs of profile {profile.name!r}, "
+            f"{', '.join(wanted)}; it has {', '.join(there)}. Choose another device or profile"
+        )
