@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import ClassVar, Final
 
 import shiboken6
-from PySide6.QtCore import QObject, QThread
+from PySide6.QtCore import QCoreApplication, QObject, QThread
 from typing_extensions import override
 
 from cosmic.frame.errors import WrongThreadError
@@ -46,6 +46,9 @@ class WorkerThread(QThread):
     def __init__(self, name: str, policy: FailurePolicy, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.setObjectName(name)
+        window = QCoreApplication.instance()
+        if parent is None and window is not None:
+            self.moveToThread(window.thread())  # which leaves it behind where it hangs at the end
         self._policy = policy
         self._end_requested = threading.Event()
         with _alive_lock:
@@ -109,7 +112,9 @@ def _end_what_still_runs() -> None:
     for thread in left:
         thread.request_end()
     for thread in left:
-        thread.join(2.0)
+        if not thread.join(2.0) and thread.parent() is None:
+            # It hangs in a driver. What has a parent is not destroyed with the interpreter.
+            thread.setParent(QThread.currentThread())
 
 
 _busy_threads: dict[int, str] = {}
