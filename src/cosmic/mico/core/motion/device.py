@@ -22,6 +22,7 @@ from cosmic.frame.errors import (
     refusal,
 )
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.forked import FORKED
 from cosmic.frame.heartbeat import STALL_S
 from cosmic.frame.inbox import Inbox
 from cosmic.frame.operation import Task
@@ -276,6 +277,12 @@ class Device(WorkerThread):
         self._open = True
         self._queries.start()
         self.start()
+
+    @override
+    def on_fork(self) -> None:
+        super().on_fork()
+        self._intake = Lock()  # whoever held it is not here
+        self._stall = FORKED
 
     def submit(self, order: Order) -> None:
         """Queue `order`; how it goes is reported by its movement and by signals.
