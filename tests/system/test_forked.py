@@ -1,6 +1,7 @@
 """A process forked from the one that drives the platform harms nothing there, and says why not."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import cosmic
+from contract.station_rig import free_port
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 
@@ -49,6 +51,30 @@ with cosmic.connect(applications=("mico",)) as rig:
         asked |= ask(mico, CLEAR, 1)
     forked.join()
     print("parent", asked, ask(mico, BLOCKED, 1), round(moving.wait(60)), forked.exitcode)
+"""
+)
+
+REMOTE = (
+    """
+import os
+import sys
+import cosmic
+"""
+    + TRIES
+    + """
+with cosmic.connect(applications=("mico",), stations=["st=" + sys.argv[1]]) as rig:
+    rig.take_control()
+    mico, axis = rig.mico, rig.mico["left.x"]
+    print("parent", round(axis.move_to(20.0)))
+    child = os.fork()
+    if child == 0:
+        tried("move", lambda: axis.move_to(500.0))
+        tried("halt", axis.halt)
+        tried("stop", lambda: mico.stop("child"))
+        sys.exit(7)
+    while not (ended := os.waitpid(child, os.WNOHANG))[0]:
+        axis.move_to(22.0)
+    print("parent", round(axis.move_to(30.0)), os.waitstatus_to_exitcode(ended[1]))
 """
 )
 
@@ -97,6 +123,24 @@ def test_a_forked_process_commands_nothing_and_takes_no_answer_of_the_gate() -> 
 
 def test_the_platform_goes_on_beside_a_forked_process() -> None:
     assert "parent {'ALLOWED'} {'COLLISION'} 300 0" in output_of(COMMANDS)
+
+
+def test_a_process_forked_from_a_client_says_nothing_to_the_station(tmp_path: Path) -> None:
+    address = f"tcp/127.0.0.1:{free_port()}"
+    command = ["serve", "--applications", "mico", "--name", "st", "--listen", address]
+    with subprocess.Popen(
+        [sys.executable, "-m", "cosmic", *command], cwd=tmp_path, stdout=subprocess.PIPE, text=True
+    ) as station:
+        try:
+            assert station.stdout is not None
+            assert "serves mico" in station.stdout.readline()
+            lines = output_of(REMOTE, address).splitlines()
+        finally:
+            station.send_signal(signal.SIGINT)
+            station.wait(60)
+    assert [each for each in lines if each.startswith("parent")] == ["parent 20", "parent 30 7"]
+    refused = [each for each in lines if "forked from the one that drives" in each]
+    assert [each.split()[0] for each in refused] == ["move", "halt", "stop"]
 
 
 def test_a_forked_process_that_ends_writes_nothing_into_a_recording(tmp_path: Path) -> None:

@@ -144,10 +144,11 @@ def _end_what_still_runs() -> None:
     for thread in left:
         thread.request_end()
     hang = [thread for thread in left if not thread.join(2.0)]
+    here = QThread.currentThread()
     for thread in (*hang, *_not_here):
-        if shiboken6.isValid(thread) and thread.parent() is None:
+        if shiboken6.isValid(thread) and thread.parent() is None and thread.thread() == here:
             # What has a parent is not destroyed with the interpreter, which would end in an abort.
-            thread.setParent(QThread.currentThread())
+            thread.setParent(here)
 
 
 _busy_threads: dict[int, str] = {}
