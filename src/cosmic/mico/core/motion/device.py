@@ -343,7 +343,10 @@ class Device(WorkerThread):
 
     def stop_channel(self, channel: int) -> None:
         """Have the library stop one channel, past every queue."""
-        self.calls.past(partial(self._stop_channel, channel))
+        if self.calls.suspect:
+            self.calls.past(partial(self._stop_channel, channel))
+        else:
+            self._stop_channel(channel)
 
     def _stop_channel(self, channel: int) -> None:
         try:

@@ -40,18 +40,15 @@ class DriverCalls:
     @property
     def suspect(self) -> bool:
         """Whether a call of the library may hang."""
-        return any(each.overdue(SUSPECT_S) for each in (self.device, self.listener))
+        return self.device.overdue(SUSPECT_S) or self.listener.overdue(SUSPECT_S)
 
     def past(self, call: Callable[[], None]) -> None:
-        """Make a call that stops: at once here, or in another thread where this one may hang.
+        """Make a call that stops in another thread, for it may hang in it; returns at once.
 
         That thread makes one after the other; the device thread repeats each when it comes back.
         """
-        if self.suspect:
-            self._stopped_past = True
-            self._stops.submit(call, "stop")
-        else:
-            call()
+        self._stopped_past = True
+        self._stops.submit(call, "stop")
 
     def _on_stall(self, which: int, stalled_s: float) -> None:
         before = bool(self._stalled)
