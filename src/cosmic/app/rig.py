@@ -22,6 +22,7 @@ from cosmic.daqco.api.daqco import Daqco, daqco_of
 from cosmic.frame.arguments import check_named, checked_class
 from cosmic.frame.declaration import Declared
 from cosmic.frame.errors import NotAvailable
+from cosmic.frame.forked import FORKED, Owner
 from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.vico.api.vico import Vico, vico_of
 
@@ -85,6 +86,7 @@ class Rig:
                 rate=platform.clock.rate,
             )
         self._handling: FibreHandling | None = None
+        self._owner = Owner()
 
     def commanding_as(self, source: str) -> "Rig":
         """Return the same rig, whose movements are logged by another name, such as "console".
@@ -107,6 +109,7 @@ class Rig:
     @property
     def mico(self) -> Mico:
         """Micromanipulation; raises `NotAvailable` where it is not hosted."""
+        self._check_owner()
         if self._mico is None:
             raise NotAvailable("mico is not hosted here; name it in the platform file")
         return self._mico
@@ -114,6 +117,7 @@ class Rig:
     @property
     def daqco(self) -> Daqco:
         """Data acquisition; raises `NotAvailable` where it is not hosted."""
+        self._check_owner()
         if self._daqco is None:
             raise NotAvailable("daqco is not hosted here; name it in the platform file")
         return self._daqco
@@ -121,6 +125,7 @@ class Rig:
     @property
     def vico(self) -> Vico:
         """Vision; raises `NotAvailable` where it is not hosted."""
+        self._check_owner()
         if self._vico is None:
             raise NotAvailable("vico is not hosted here; name it in the platform file")
         return self._vico
@@ -128,6 +133,7 @@ class Rig:
     @property
     def control(self) -> Control:
         """Control loops; raises `NotAvailable` where mico is not hosted."""
+        self._check_owner()
         if self._control is None:
             raise NotAvailable("mico is not hosted here; a control loop needs axes")
         return self._control
@@ -382,7 +388,12 @@ class Rig:
         """Return a run that begins only while nothing else runs."""
         return self._made(procedure, work, lambda: self.running)
 
+    def _check_owner(self) -> None:
+        if not self._owner.here:
+            raise NotAvailable(FORKED)
+
     def _check_open(self) -> None:
+        self._check_owner()
         if self._shared.closed:
             raise NotAvailable("the platform is closed; connect again for another one")
 
@@ -458,7 +469,10 @@ class Rig:
         StationAway
             The axes are at a station that cannot be reached. What this program had begun to move
             there stops by itself.
+        NotAvailable
+            This process was forked from the one that drives the platform: nothing was stopped.
         """
+        self._check_owner()
         try:
             if self._mico is not None:
                 self._mico.stop(reason)
@@ -514,10 +528,11 @@ class Rig:
     def close(self) -> None:
         """Stop everything, release the hold and end all threads; harmless the second time.
 
-        One made by `commanding_as` does nothing: the platform is not its own.
+        One made by `commanding_as` does nothing, nor does it in a process that was forked: the
+        platform is not its own.
         """
         shared = self._shared
-        if self._first and not shared.closed:
+        if self._first and not shared.closed and self._owner.here:
             shared.closed = True
             atexit.unregister(self.close)
             if shared.handling is not None:

@@ -41,6 +41,12 @@ class Heartbeat:
         """Say that the thread ends, and is not to be watched any more."""
         self._beats = 0
 
+    def overdue(self, by_s: float) -> bool:
+        """Tell whether a call, waits that were announced aside, takes longer than `by_s`."""
+        beats = self._beats
+        announced_s = self._allowed_s - STALL_S
+        return 0 < beats == self._seen and self._missed_s >= announced_s + by_s
+
     def look(self, passed_s: float) -> None:
         """Tell whether there was no beat for too long, or there is one again; thread of the watch.
 
@@ -65,6 +71,10 @@ class HeartbeatWatch(WorkerThread):
     def __init__(self, name: str, beats: Sequence[Heartbeat], policy: FailurePolicy) -> None:
         super().__init__(name, policy)
         self._heartbeats = tuple(beats)
+
+    def add(self, beats: Sequence[Heartbeat]) -> None:
+        """Look at more of them from now on; by the thread that started the watch."""
+        self._heartbeats = (*self._heartbeats, *beats)
 
     @override
     def run_body(self) -> None:

@@ -20,6 +20,7 @@ from typing import IO, TYPE_CHECKING, Any, Final
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, ProtocolError
+from cosmic.frame.forked import FORKED, Owner
 
 if sys.platform == "win32":
     from multiprocessing.connection import PipeConnection as _PipeEnd
@@ -127,6 +128,7 @@ class HelperProcess:
         background: bool = False,
     ) -> None:
         self.ready = False
+        self._owner = Owner()
         self.began_s = WALL.now_s()
         self._numbers = count(READY + 1)
         self._left: tuple[int, str, object] | None = None
@@ -150,6 +152,11 @@ class HelperProcess:
         return self._process.pid
 
     @property
+    def foreign(self) -> bool:
+        """True in a process that was forked: the answers are for the one that it came from."""
+        return not self._owner.here
+
+    @property
     def running(self) -> bool:
         """False once it has ended."""
         return self._process.poll() is None
@@ -162,6 +169,7 @@ class HelperProcess:
         HelperFaultError
             It has died, or cannot start its work.
         """
+        self._check_owner()
         if not self.ready:
             try:
                 if not self._pipe.poll(wait_s):
@@ -253,6 +261,7 @@ class HelperProcess:
         HelperFaultError
             It takes no questions.
         """
+        self._check_owner()
         try:
             self._pipe.send_bytes(encode((number, kind, payload, limit_s)))
         except OSError as exc:
@@ -268,7 +277,12 @@ class HelperProcess:
         """
         return self._receive() if self._poll(wait_s) else None
 
+    def _check_owner(self) -> None:
+        if self.foreign:
+            raise HelperFaultError(FORKED)
+
     def _poll(self, wait_s: float) -> bool:
+        self._check_owner()
         try:
             return self._pipe.poll(wait_s)
         except OSError as exc:
@@ -293,13 +307,15 @@ class HelperProcess:
 
     def kill(self) -> None:
         """End it at once; any thread, also while another waits for an answer."""
-        self._process.kill()
+        if not self.foreign:
+            self._process.kill()
 
     def end(self) -> str:
         """End it, give everything back and return what it wrote last; harmless repeated."""
-        self._process.kill()
+        self.kill()
         try:
-            self._process.wait(END_S)
+            if not self.foreign:
+                self._process.wait(END_S)
         except subprocess.TimeoutExpired:
             return f"process {self.pid} does not end"
         finally:

@@ -168,6 +168,12 @@ class JobQueue(WorkerThread):
             self._jobs.close()
 
     @override
+    def on_fork(self) -> None:
+        super().on_fork()
+        self._jobs, self._starting = Jobs(self.name), Lock()  # whoever held a lock is not here
+        self._jobs.close()
+
+    @override
     def request_end(self) -> None:
         with self._starting:
             super().request_end()

@@ -7,6 +7,7 @@ import stat
 from collections.abc import Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
+from itertools import count
 from pathlib import Path
 from typing import BinaryIO, Final
 
@@ -14,7 +15,8 @@ import tomlkit
 from tomlkit.items import Item
 
 PART: Final = ".part"
-"""What follows the name of a file while it is written."""
+"""How the name of a file ends while it is written."""
+_numbers: Final = count(1)
 
 
 def open_file(path: Path) -> BinaryIO:
@@ -34,7 +36,8 @@ def open_file(path: Path) -> BinaryIO:
 def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file; the old one stays whole until the new one is on the disk.
 
-    A link stays, and what it leads to is written. Who may read the file stays as it was.
+    A link stays, and what it leads to is written. Who may read the file stays as it was. Of several
+    that write it at once, in this program or others, the last is kept as a whole.
 
     Parameters
     ----------
@@ -48,7 +51,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
         characters; nothing of it is left.
     """
     path = Path(os.path.realpath(path))
-    part = path.with_name(path.name + PART)
+    part = path.with_name(f"{path.name}.{os.getpid()}-{next(_numbers)}{PART}")
     mode = _mode_of(path)
     text = isinstance(content, str)
     if isinstance(content, str):

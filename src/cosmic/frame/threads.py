@@ -1,6 +1,7 @@
 """The only threads there are: `WorkerThread` and its subclasses."""
 
 import atexit
+import os
 import sys
 import threading
 import weakref
@@ -9,7 +10,7 @@ from contextlib import contextmanager
 from typing import ClassVar, Final
 
 import shiboken6
-from PySide6.QtCore import QObject, QThread
+from PySide6.QtCore import QCoreApplication, QObject, QThread
 from typing_extensions import override
 
 from cosmic.frame.errors import WrongThreadError
@@ -42,14 +43,18 @@ class WorkerThread(QThread):
 
     may_wait: ClassVar[bool] = True
     """False for a thread that brings movements about, and so must never wait for one."""
+    _left_in_parent = False
 
     def __init__(self, name: str, policy: FailurePolicy, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.setObjectName(name)
+        window = QCoreApplication.instance()
+        if parent is None and window is not None:
+            self.moveToThread(window.thread())  # which leaves it behind where it hangs at the end
         self._policy = policy
         self._end_requested = threading.Event()
-        with _alive_lock:
-            _alive.add(self)
+        with _alive.lock:
+            _alive.threads.add(self)
 
     @property
     def name(self) -> str:
@@ -73,7 +78,7 @@ class WorkerThread(QThread):
 
     def join(self, timeout_s: float = JOIN_TIMEOUT_S) -> bool:
         """Wait until the thread has ended; False when it had not after `timeout_s` of wall time."""
-        return self.wait(int(timeout_s * 1000))
+        return self._left_in_parent or self.wait(int(timeout_s * 1000))
 
     @override
     def run(self) -> None:
@@ -90,16 +95,46 @@ class WorkerThread(QThread):
             if take_back is not None:
                 take_back()
 
+    def on_fork(self) -> None:
+        """Count as ended: called in a process that was forked, which has none of the threads."""
+        self._left_in_parent = True
+        _not_here.append(self)
+        self._end_requested = threading.Event()
+        self._end_requested.set()
 
-_alive: "weakref.WeakSet[WorkerThread]" = weakref.WeakSet()
-_alive_lock = threading.Lock()
+
+class _Alive:
+    """The threads that were made and not deleted."""
+
+    def __init__(self) -> None:
+        self.threads: weakref.WeakSet[WorkerThread] = weakref.WeakSet()
+        self.lock = threading.Lock()
+
+
+_alive: Final = _Alive()
+_not_here: list[WorkerThread] = []
+"""In a process that was forked, those of the other one: Qt takes them for running."""
+
+
+def _on_fork() -> None:
+    _alive.lock = threading.Lock()  # whoever held it is not here
+    for thread in list(_alive.threads):
+        thread.on_fork()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
+    os.register_at_fork(after_in_child=_on_fork)
 
 
 def running_threads() -> list[WorkerThread]:
     """Return the worker threads that run now."""
-    with _alive_lock:
-        threads = list(_alive)
-    return [thread for thread in threads if shiboken6.isValid(thread) and thread.isRunning()]
+    with _alive.lock:
+        threads = list(_alive.threads)
+    return [
+        thread
+        for thread in threads
+        if shiboken6.isValid(thread) and thread.isRunning() and thread not in _not_here
+    ]
 
 
 @atexit.register
@@ -108,8 +143,12 @@ def _end_what_still_runs() -> None:
     left = running_threads()
     for thread in left:
         thread.request_end()
-    for thread in left:
-        thread.join(2.0)
+    hang = [thread for thread in left if not thread.join(2.0)]
+    here = QThread.currentThread()
+    for thread in (*hang, *_not_here):
+        if shiboken6.isValid(thread) and thread.parent() is None and thread.thread() == here:
+            # What has a parent is not destroyed with the interpreter, which would end in an abort.
+            thread.setParent(here)
 
 
 _busy_threads: dict[int, str] = {}

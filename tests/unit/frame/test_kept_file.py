@@ -1,10 +1,12 @@
 """What the program writes as TOML is what a reader of TOML finds."""
 
+import errno
 import math
 import os
 import stat
 import sys
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -49,13 +51,41 @@ def test_a_number_that_is_not_finite_is_not_kept(value: object) -> None:
         toml_lines({"value": value})
 
 
-def test_the_old_file_stays_whole_where_the_new_one_cannot_be_made(tmp_path: Path) -> None:
+def test_the_old_file_stays_whole_where_the_new_one_cannot_be_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file = tmp_path / "kept.toml"
     write_whole(file, "old = 1\n")
-    (tmp_path / "kept.toml.part").mkdir()
+
+    def full(_handle: int) -> None:
+        raise OSError(errno.ENOSPC, "no space left", "kept")
+
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="kept"):
         write_whole(file, "new = 2\n")
     assert file.read_text(encoding="utf-8") == "old = 1\n"
+    assert [each.name for each in tmp_path.iterdir()] == ["kept.toml"]
+
+
+def test_of_two_that_write_a_file_at_once_one_is_kept_as_a_whole(tmp_path: Path) -> None:
+    file = tmp_path / "kept.toml"
+    texts = ["a" * 20_000, "b" * 20_000]
+    write_whole(file, texts[0])
+
+    def write(text: str) -> None:
+        for _ in range(50):
+            write_whole(file, text)
+
+    with ThreadPoolExecutor(2) as pool:
+        writing = [pool.submit(write, text) for text in texts]
+        seen = set()
+        while not all(each.done() for each in writing):
+            seen.add(file.read_text(encoding="utf-8"))
+    for each in writing:
+        each.result()
+    assert seen <= set(texts)
+    assert file.read_text(encoding="utf-8") in texts
+    assert [each.name for each in tmp_path.iterdir()] == ["kept.toml"]
 
 
 def test_a_text_that_no_file_can_have_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:

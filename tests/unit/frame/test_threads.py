@@ -215,6 +215,43 @@ def test_a_process_that_forgot_a_thread_ends_it_in_order() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, "left in order\n", "")
 
 
+HANGS = """
+import sys
+import threading
+from PySide6.QtCore import QCoreApplication
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.threads import WorkerThread
+
+application = QCoreApplication([])
+made = []
+
+class Hanging(WorkerThread):
+    def run_body(self):
+        threading.Event().wait()
+
+class Making(WorkerThread):
+    def run_body(self):
+        hang()
+
+def hang():
+    made.append(Hanging("hangs in a driver", FailurePolicy()))
+    made[-1].start()
+
+hang()
+making = Making("makes another", FailurePolicy())
+making.start()
+making.join()
+sys.exit(3)
+"""
+
+
+def test_a_program_keeps_its_exit_code_with_threads_that_never_end() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", HANGS], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stderr) == (3, "")
+
+
 def test_waiting_is_forbidden_in_a_declared_gui_thread_only() -> None:
     take_back = declare_gui_thread()
     with pytest.raises(WrongThreadError, match="moving would freeze the window"):

@@ -1,6 +1,7 @@
 """`CollisionManager`: verdicts in words, what is left out of the check, and responses."""
 
 import logging
+import math
 import os
 import signal
 import sys
@@ -155,6 +156,16 @@ def test_several_axes_are_all_named_and_none_is_blamed(manager: CollisionManager
     assert verdict.axis == ""
     assert str(verdict).startswith("left.x and right.x: ")
     assert "one axis after the other" in str(verdict)
+
+
+def test_an_axis_that_was_lost_in_its_movement_is_named_as_what_to_find_first(
+    manager: CollisionManager,
+) -> None:
+    lost = AxisSpan(-math.inf, math.inf, moving=True)
+    verdict = manager.check({**resting(), "left.x": lost, "right.x": way(0.0, 10.0)})
+    assert verdict.reason is Reason.COLLISION
+    assert "nobody knows where left.x is: press Rescan" in str(verdict)
+    assert "one axis after the other" not in str(verdict)
 
 
 def test_a_pair_inside_its_margin_may_only_retreat(manager: CollisionManager) -> None:

@@ -1,9 +1,11 @@
 """`RecordingFile`: a recording being written, without a thread of its own."""
 
+import os
 from collections.abc import Iterable
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any, Final
+from weakref import WeakSet
 
 import h5py
 import numpy as np
@@ -33,6 +35,16 @@ WRITE_ERRORS: Final = (OSError, RuntimeError, ValueError)
 """What h5py raises when a file cannot be written."""
 
 _abandoned: list["RecordingFile"] = []
+_open_files: Final["WeakSet[RecordingFile]"] = WeakSet()
+
+
+def _on_fork() -> None:
+    for each in list(_open_files):
+        each.leave_to_parent()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
+    os.register_at_fork(after_in_child=_on_fork)
 
 
 def block_samples(rate_hz: float) -> int:
@@ -83,6 +95,8 @@ class RecordingFile:
         self._closing = False
         self._hold: FileHold | None = None
         self._file = self._created(overwrite=overwrite)
+        self._handle = self._file.id.get_vfd_handle() if hasattr(os, "fork") else -1
+        _open_files.add(self)
         self._size_bytes = 0
         held_bytes = self._block.nbytes + self._values.nbytes + self._times.nbytes
         self._preallocation = Preallocation(self._file, path, 2 * held_bytes + TABLES_BYTES)
@@ -193,6 +207,7 @@ class RecordingFile:
         self._size_bytes = self._preallocation.used_bytes
         if complete:
             self._file["complete"][()] = 1
+        _open_files.discard(self)
         self._file.close()
         trim(self._path)
         if self._hold is not None:
@@ -206,6 +221,15 @@ class RecordingFile:
         """
         if self._file:
             _abandoned.append(self)
+
+    def leave_to_parent(self) -> None:
+        """Write nothing more into the file, in a process that was forked from the one that does.
+
+        As it ends HDF5 would write what it last knew over what the other has written since.
+        """
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        os.dup2(nowhere, self._handle)
+        os.close(nowhere)
 
     def _created(self, *, overwrite: bool) -> h5py.File:
         path = self._path
@@ -236,6 +260,7 @@ class RecordingFile:
         try:
             self._preallocation.need()
         except OSError as exc:
+            _open_files.discard(self)
             self._file.close()
             self._path.unlink(missing_ok=True)
             raise self._no_room(exc) from exc

@@ -12,6 +12,7 @@ from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.events import Event, notify
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.forked import FORKED
 from cosmic.frame.network.addresses import topic_key
 from cosmic.frame.network.client_session import ClientSession, What, read_hosted
 from cosmic.frame.network.errors import CallRefused, StationAway, StationTimeout
@@ -169,6 +170,12 @@ class ClientSideConnection(WorkerThread):
         """As `Transport.release_lease`."""
         self._note_lease(holds=False)
         self._order(Order.RELEASE)
+
+    @override
+    def on_fork(self) -> None:
+        super().on_fork()
+        self._lock, self._changed = Lock(), Condition()  # whoever held one is not here
+        self._presence = Presence(self._station, here=False, why=FORKED)
 
     @override
     def request_end(self) -> None:

@@ -7,6 +7,7 @@ process whose main thread has died would go on answering. Threads of ours wait o
 import atexit
 import json
 import logging
+import os
 import weakref
 from collections.abc import Callable
 from threading import Lock
@@ -262,6 +263,10 @@ def _undeclare(declared: Any) -> None:
 
 
 _open_wires: Final["weakref.WeakSet[ZenohWire]"] = weakref.WeakSet()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
+    os.register_at_fork(after_in_child=_open_wires.clear)  # closing one waits for its threads
 
 
 @atexit.register

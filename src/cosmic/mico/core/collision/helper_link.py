@@ -12,6 +12,7 @@ from typing import Final, TypeVar
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.forked import FORKED
 from cosmic.frame.helper_process import (
     PROTOCOL,
     HelperFaultError,
@@ -264,6 +265,8 @@ class GateProcess:
         if self._helper is None:
             self._launch()
         helper = self._helper
+        if helper is not None and helper.foreign:
+            raise NoAnswerError(FORKED)
         try:
             if helper is not None and helper.poll_ready(0.0):
                 return helper

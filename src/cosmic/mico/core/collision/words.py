@@ -82,7 +82,7 @@ def collision(
         place_um=approach.place_um,
         clearance_um=approach.distance_um,
         pose=tuple(approach.pose.items()),
-        text=story if inside else f"{story}; {_advice(axes, limit, unit)}",
+        text=story if inside else f"{story}; {_advice(axes, spans, limit, unit)}",
     )
 
 
@@ -112,13 +112,23 @@ def _already(model: SceneModel, axes: Sequence[str], approach: Approach) -> str:
     )
 
 
-def _advice(axes: Sequence[str], limit: float | None, unit: str) -> str:
+def _advice(axes: Sequence[str], spans: Spans, limit: float | None, unit: str) -> str:
     if limit is not None:
         shown = f"{limit:.1f} {DISPLAY.get(unit, unit)}".strip()
         return f"it may go to {shown}, or move one of them aside first"
+    lost = [axis for axis in axes if _may_be_anywhere(spans[axis])]
+    if lost and len(axes) > 1:
+        return (
+            f"nobody knows where {_names(lost)} is: press Rescan when its device answers again; "
+            "if that does not help, restart the program"
+        )
     if len(axes) > 1:
         return "move one axis after the other, or one of the two aside first"
     return "move one of them aside first"
+
+
+def _may_be_anywhere(span: AxisSpan) -> bool:
+    return span.now is None and math.isinf(span.low) and math.isinf(span.high)
 
 
 def _mover_first(model: SceneModel, axes: Sequence[str], bodies: BodyPair) -> BodyPair:

@@ -14,6 +14,7 @@ from typing_extensions import override
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ConfigError, DeviceError, DeviceFault, NotAvailable
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.heartbeat import STALL_S, Heartbeat
 from cosmic.frame.threads import WorkerThread
 from cosmic.mico.core.motion.orders import COMMON
 from cosmic.mico.core.motion.positioner import (
@@ -278,6 +279,8 @@ class DeviceListener(WorkerThread):
     ----------
     on_lost : callable
         Told why when the device cannot be reached any more; called in this thread.
+    heartbeat : Heartbeat
+        Stays away while a call of the library does not return.
     """
 
     may_wait = False
@@ -288,11 +291,13 @@ class DeviceListener(WorkerThread):
         container: DeviceDataContainer,
         policy: FailurePolicy,
         on_lost: Callable[[DeviceError], None],
+        heartbeat: Heartbeat,
     ) -> None:
         super().__init__(f"listener {container.device}", policy)
         self._controller = controller
         self._container = container
         self._on_lost = on_lost
+        self._heartbeat = heartbeat
 
     @override
     def run_body(self) -> None:
@@ -301,9 +306,12 @@ class DeviceListener(WorkerThread):
         except BaseException as exc:
             self._on_lost(DeviceError(f"its listener failed: {exc!r}"))
             raise
+        finally:
+            self._heartbeat.end()
 
     def _listen(self) -> None:
         while not self.end_requested:
+            self._heartbeat.beat(RECEIVE_S + STALL_S)
             try:
                 event = self._controller.receive(self._container.library_index, RECEIVE_S)
             except DeviceError as exc:

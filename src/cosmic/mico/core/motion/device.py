@@ -22,6 +22,8 @@ from cosmic.frame.errors import (
     refusal,
 )
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.forked import FORKED
+from cosmic.frame.heartbeat import STALL_S
 from cosmic.frame.inbox import Inbox
 from cosmic.frame.operation import Task
 from cosmic.frame.threads import JOIN_TIMEOUT_S, WorkerThread
@@ -29,6 +31,7 @@ from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.motion.channel import ChannelController
 from cosmic.mico.core.motion.channel_context import AxisReports, ChannelContext
 from cosmic.mico.core.motion.data_container import DeviceDataContainer
+from cosmic.mico.core.motion.driver_watch import DriverCalls
 from cosmic.mico.core.motion.gate import Gate
 from cosmic.mico.core.motion.gate_queue import GateQueue
 from cosmic.mico.core.motion.messages import (
@@ -193,6 +196,11 @@ class Device(WorkerThread):
     position_changed(PositionChanged), state_changed(PositionerState),
     movement_begun(MovementBegun), movement_ended(MovementEnded), movement_refused(MoveVerdict),
     lost(DeviceLost)
+
+    Attributes
+    ----------
+    calls : DriverCalls
+        Whether the library returns from its calls for this device.
     """
 
     may_wait = False
@@ -216,6 +224,7 @@ class Device(WorkerThread):
         parent: QObject | None = None,
     ) -> None:
         super().__init__(f"device {container.device}", policy, parent)
+        self.calls = DriverCalls(self.name, policy, self._on_stall)
         self._controller = controller
         self.container = container
         self._settings = settings
@@ -224,7 +233,8 @@ class Device(WorkerThread):
         self._open = False
         self._nudged = False
         self._stops_seen = 0
-        self._newest: dict[int, int] = {}
+        self._newest: dict[int, Order] = {}
+        self._stall = ""
         self._void: dict[int, int] = {}
         self._queries = GateQueue(
             gate, clock=clock, inbox=self._inbox, policy=policy, device=container.device
@@ -248,6 +258,11 @@ class Device(WorkerThread):
         return self.container.device
 
     @property
+    def stall(self) -> str:
+        """Why it takes no orders: the library does not return; empty while it does."""
+        return self._stall
+
+    @property
     def _channels(self) -> dict[int, ChannelController]:
         return self._discovery.channels
 
@@ -262,6 +277,12 @@ class Device(WorkerThread):
         self._open = True
         self._queries.start()
         self.start()
+
+    @override
+    def on_fork(self) -> None:
+        super().on_fork()
+        self._intake = Lock()  # whoever held it is not here
+        self._stall = FORKED
 
     def submit(self, order: Order) -> None:
         """Queue `order`; how it goes is reported by its movement and by signals.
@@ -287,9 +308,9 @@ class Device(WorkerThread):
         if order.epoch is None:
             order = order._replace(epoch=stop.epoch)
         with self._intake:
-            taken = self._open
+            taken = self._open and not self._stall
             if taken:
-                self._newest[order.channel] = order.number
+                self._newest[order.channel] = order
                 self._inbox.put(order)
         if not taken:
             self._turn_away(order, self.container.state(order.channel))
@@ -309,15 +330,31 @@ class Device(WorkerThread):
 
     def halt(self, channel: int, why: str) -> None:
         """Stop one channel past every queue; its movement fails with `MoveCancelled`."""
-        name = self._shown(channel)
+        self._withdraw(channel, MoveCancelled(f"{self._shown(channel)}: {why}"))
+        self.stop_channel(channel)
+
+    def _withdraw(self, channel: int, error: CosmicError) -> None:
+        """Void what was ordered of a channel so far."""
         with self._intake:
-            self._void[channel] = self._newest.get(channel, 0)
-        # First, so that the device thread knows of the halt before it sees the axis at rest.
-        self._inbox.put(Halt(channel, MoveCancelled(f"{name}: {why}")))
+            newest = self._newest.get(channel)
+            self._void[channel] = 0 if newest is None else newest.number
+        # Before the stop: the device thread knows of the halt before it sees the axis at rest.
+        self._inbox.put(Halt(channel, error))
+
+    def stop_channel(self, channel: int) -> None:
+        """Have the library stop one channel, past every queue."""
+        if self.calls.suspect:
+            self.calls.past(partial(self._stop_channel, channel))
+        else:
+            self._stop_channel(channel)
+
+    def _stop_channel(self, channel: int) -> None:
         try:
             self._controller.stop(self.container.address(channel))
         except DeviceError as exc:
-            logger.warning("%s: %s", name, exc)
+            logger.error("%s: stop failed: %s", self._shown(channel), exc)
+        except Exception:  # of a controller that somebody brought: the others are stopped too
+            logger.exception("%s: stop failed", self._shown(channel))
 
     def _cancel(self, order: Order) -> None:
         """Stop one movement; another one that has replaced it goes on."""
@@ -327,10 +364,7 @@ class Device(WorkerThread):
         active = axis.monitor.active if axis is not None else None
         if active is None or active.order.movement is not order.movement:
             return  # not begun, or over: the device thread sees to the rest
-        try:
-            self._controller.stop(self.container.address(order.channel))
-        except DeviceError as exc:
-            logger.warning("device %d channel %d: %s", self.index, order.channel, exc)
+        self.stop_channel(order.channel)
 
     def _spent(self, order: Order) -> MoveVerdict:
         name = self._shown(order.channel)
@@ -414,6 +448,7 @@ class Device(WorkerThread):
     @override
     def run_body(self) -> None:
         try:
+            self.calls.device.beat()
             self._guarded(self._discovery.begin)
             while not self.end_requested:
                 self._take_waiting()
@@ -424,15 +459,19 @@ class Device(WorkerThread):
             raise
         finally:
             self._close_intake()
+            self.calls.device.end()
 
     def _take_waiting(self) -> None:
         """Wait for a message, then take all there are, so that none waits behind a poll."""
         timeout_s = self._pause_s()
+        self.calls.device.beat(timeout_s + STALL_S)
         for _ in range(MOST_AT_ONCE):
             try:
                 message = self._inbox.get(timeout_s)
             except Empty:
-                return
+                break
+            finally:
+                self.calls.device.beat()
             try:
                 self._take(message)
             except DeviceError as exc:
@@ -587,6 +626,7 @@ class Device(WorkerThread):
         state = state or self.container.state(order.channel)
         name = state.name if state else f"device {self.index} channel {order.channel}"
         why = state.error if state and state.error else "it is not connected; check it, then rescan"
+        why = self._stall or why
         verdict = refuse(Reason.DEVICE, f"{name}: {why}", axis=name)
         self._context.gate.withdraw(order.reservation)
         self._context.reports.refused(order, verdict)
@@ -617,6 +657,39 @@ class Device(WorkerThread):
 
     # Trouble and the end
 
+    def _on_stall(self, stalled_s: float) -> None:
+        """Say that the library hangs, or that it goes on; thread of the watch."""
+        if not stalled_s:
+            text, self._stall = self._stall, ""
+            logger.warning("device %d: the controller has returned, and goes on", self.index)
+            self._mark(text, "")
+            return
+        channels = self.container.channels()
+        axes = ", ".join(map(self._shown, channels)) or "no axes yet"
+        text = (
+            f"device {self.index} ({axes}): its controller has not returned from a call for "
+            f"{stalled_s:g} s; whether these axes move is unknown. Check its power and cable, or "
+            "unplug it and plug it in again; if that does not help, restart the program"
+        )
+        with self._intake:  # what is taken from now on would wait for ever
+            self._stall = text
+        error = DeviceTimeout(text, fault=DeviceFault.TIMEOUT)
+        waiting = [each for each in self._newest.values() if not each.movement.done]
+        for order in waiting:
+            self._withdraw(order.channel, error)
+            self.stop_channel(order.channel)
+        self._mark("", text)
+        self._policy.report(error, self.name)
+        for order in waiting:
+            order.movement.fail(error)
+
+    def _mark(self, before: str, text: str) -> None:
+        """Show `text` at every axis that is here, in place of `before`."""
+        for channel in self.container.channels():
+            state = self.container.state(channel)
+            if state is not None and state.present and (text or state.error == before):
+                self.state_changed.emit(self.container.update(channel, error=text))
+
     def _on_lost(self, error: DeviceError) -> None:
         self._open = False
         logger.error("device %d is lost: %s", self.index, error)
@@ -640,10 +713,7 @@ class Device(WorkerThread):
         self._queries.close_intake()
         error = MoveCancelled(f"device {self.index} was closed")
         for channel, axis in self._channels.items():
-            try:
-                self._controller.stop(self.container.address(channel))
-            except DeviceError as exc:
-                logger.warning("%s: %s", axis.name, exc)
+            self._stop_channel(channel)
             axis.monitor.lose(error)
         self._queries.fail_all(error)
         self._queries.close()

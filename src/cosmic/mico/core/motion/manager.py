@@ -1,7 +1,16 @@
 """`DeviceManager`: finds the devices, owns their threads, and stops them all (thesis 6.1)."""
 
 import logging
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
+from collections.abc import (
+    Callable,
+    Collection,
+    Generator,
+    Iterable,
+    Mapping,
+    Sequence,
+    Set,
+)
+from contextlib import contextmanager
 from dataclasses import dataclass
 from threading import RLock
 from typing import Final
@@ -9,7 +18,7 @@ from typing import Final
 from PySide6.QtCore import QObject, Qt, Signal
 
 from cosmic.frame.arguments import reason_of
-from cosmic.frame.clock import Clock
+from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import (
     CosmicError,
     DeviceError,
@@ -19,7 +28,9 @@ from cosmic.frame.errors import (
     refusal,
 )
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.threads import WorkerThread, urgent
+from cosmic.frame.heartbeat import OPEN_S, Heartbeat, HeartbeatWatch
+from cosmic.frame.job_queue import JobQueue
+from cosmic.frame.threads import JOIN_TIMEOUT_S, WorkerThread, urgent
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
 from cosmic.mico.core.collision.collision_manager import CollisionManager
@@ -203,8 +214,11 @@ class DeviceThreads:
         self._controller = controller
         self._watch = watch
         self._policy = policy
-        self._listeners: dict[int, DeviceListener] = {}
+        self._listeners: dict[Device, DeviceListener] = {}
         self._stuck: list[WorkerThread] = []
+        self._opening = Heartbeat(self._on_opening)
+        self._driver_watch: HeartbeatWatch | None = None
+        self._opens = False
 
     def check_none_hangs(self) -> None:
         """Raise `NotConnectedError` while a thread of an earlier run still uses the library."""
@@ -214,6 +228,40 @@ class DeviceThreads:
                 f"{', '.join(stuck)} still hangs in the library; start the program again"
             )
 
+    @contextmanager
+    def opening(self) -> Generator[None]:
+        """Say so when the library does not come back from what is done meanwhile."""
+        self._end_watch()
+        self._driver_watch = HeartbeatWatch("controller watch", [self._opening], self._policy)
+        self._driver_watch.start()
+        self._opening.beat(OPEN_S)
+        self._opens = True
+        try:
+            yield
+        except BaseException:
+            self._end_watch()  # there is nothing to be watched
+            raise
+        finally:
+            self._opens = False
+            self._opening.end()
+
+    @property
+    def opens(self) -> bool:
+        """Whether the library is at opening the devices."""
+        return self._opens
+
+    def _on_opening(self, stalled_s: float) -> None:
+        """Say that looking for the devices hangs; thread of the watch."""
+        name = self._controller.name
+        if not stalled_s:
+            logger.warning("%s: looking for the devices has returned", name)
+            return
+        text = (
+            f"{name}: looking for the devices has not returned for {stalled_s:g} s. Check power "
+            "and cables, or unplug and plug in again; if that does not help, restart the program"
+        )
+        self._policy.report(NotConnectedError(text), "MiCo")
+
     def start(self, devices: Collection[Device]) -> None:
         """Start a listener and the thread of each of `devices`."""
         channels = sum(device.container.capabilities.channels for device in devices)
@@ -222,11 +270,17 @@ class DeviceThreads:
                 max(1 / self._watch.poll_hz, channels / self._watch.poll_total_hz)
             )
             listener = DeviceListener(
-                self._controller, device.container, self._policy, on_lost=device.lose
+                self._controller,
+                device.container,
+                self._policy,
+                on_lost=device.lose,
+                heartbeat=device.calls.listener,
             )
-            self._listeners[device.index] = listener
+            self._listeners[device] = listener
             listener.start()
             device.begin()
+            if self._driver_watch is not None:
+                self._driver_watch.add([device.calls.device, device.calls.listener])
 
     def stop_channels(self, devices: Iterable[Device]) -> None:
         """Stop every channel of devices, past their threads: first those known to move.
@@ -237,12 +291,7 @@ class DeviceThreads:
             (device, channel) for device in devices for channel in device.container.channels()
         ]
         for device, channel in sorted(channels, key=_stands):
-            try:
-                self._controller.stop(device.container.address(channel))
-            except DeviceError as exc:
-                logger.error("device %d channel %d: stop failed: %s", device.index, channel, exc)
-            except Exception:  # of a controller that somebody brought: the others are stopped too
-                logger.exception("device %d channel %d: stop failed", device.index, channel)
+            device.stop_channel(channel)
 
     def end(self, devices: Iterable[Device]) -> None:
         """Stop every channel, end the threads that run, and stop every channel once more."""
@@ -250,14 +299,42 @@ class DeviceThreads:
         self.stop_channels(running)  # past the threads, one of which may hang in the library
         for device in running:
             device.request_end()
-        hang: list[WorkerThread] = [device for device in running if not device.join()]
+        hang: list[WorkerThread] = [
+            device for device in running if not device.join(device.calls.join_s)
+        ]
         self.stop_channels(running)
         for listener in self._listeners.values():
             listener.request_end()
-        hang += [listener for listener in self._listeners.values() if not listener.join()]
+        for device, listener in self._listeners.items():
+            hang += device.calls.end()
+            if not listener.join(device.calls.join_s):
+                hang.append(listener)
         self._listeners.clear()
+        self._end_watch()
+        self._leave(hang)
+
+    def _end_watch(self) -> None:
+        watch, self._driver_watch = self._driver_watch, None
+        if watch is not None:
+            watch.request_end()
+            watch.join()
+
+    def close_library(self) -> None:
+        """Close the library; in another thread where one hangs in it, as this call may then."""
+        if not any(each.isRunning() for each in self._stuck):
+            self._controller.close()
+            return
+        closing = JobQueue("closing the controllers", self._policy)
+        closing.submit(self._controller.close, "closing").when_failed(
+            lambda error: logger.error("closing the controllers failed: %s", error)
+        )
+        closing.submit(closing.request_end, "the end")
+        if not closing.join():
+            self._leave([closing])
+
+    def _leave(self, hang: Sequence[WorkerThread]) -> None:
         # Kept, for Qt aborts the process over a thread that is destroyed while it runs.
-        self._stuck = [each for each in self._stuck if each.isRunning()] + hang
+        self._stuck = [*(each for each in self._stuck if each.isRunning()), *hang]
         for thread in hang:
             logger.error("%s hangs in the library and was left behind", thread.name)
 
@@ -269,6 +346,7 @@ def _stands(channel: tuple[Device, int]) -> bool:
 
 
 CLOSED: Final = "MiCo is closed"
+_LOOK_S: Final = 0.2
 WATCHED_AGAIN: Final = (
     "stopped: it is checked for collisions again, and this movement began without; give it anew"
 )
@@ -517,11 +595,14 @@ class DeviceManager(QObject):
             self._set_mode(Mode.INITIALISATION)
             self.gate.checker.start()
             try:
-                library_index = open_devices(self.controller, self.settings.all_serials)
+                with self._threads.opening():
+                    library_index = open_devices(self.controller, self.settings.all_serials)
+                    if self._closed:  # nobody waited for it any longer
+                        raise NotConnectedError(CLOSED)
             except DeviceError:
                 self.controller.close()
                 self._arrange({})
-                self._set_mode(Mode.FAILED)
+                self._set_mode(Mode.CLOSED if self._closed else Mode.FAILED)
                 raise
             self._arrange(library_index)
             self.changed.emit()  # commanders join the new devices before anybody may use them
@@ -557,13 +638,25 @@ class DeviceManager(QObject):
             self._threads.end(self._devices.values())
             for device in self._devices.values():
                 device.container.lose(CLOSED)
-            self.controller.close()
+            self._threads.close_library()
             self._set_mode(Mode.CLOSED)
 
     def close(self) -> None:
-        """Shut down for good: nothing opens the hardware again; any mode."""
+        """Shut down for good: nothing opens the hardware again; any mode.
+
+        A library that does not return from opening is left behind.
+        """
         self._closed = True
-        self.shut_down()
+        until_s = WALL.now_s() + JOIN_TIMEOUT_S
+        while not self._busy.acquire(timeout=_LOOK_S):
+            if self._threads.opens and WALL.now_s() > until_s:
+                logger.error("opening the devices does not return; it was left behind")
+                break
+        else:
+            try:
+                self.shut_down()
+            finally:
+                self._busy.release()
         self.gate.checker.close()
 
     def rescan(self) -> None:
@@ -573,8 +666,13 @@ class DeviceManager(QObject):
         ------
         NotAvailable
             An axis is moving.
+        NotConnectedError
+            The library hangs.
         """
         with self._busy:
+            hanging = [each.stall for each in self._devices.values() if each.stall]
+            if hanging:
+                raise NotConnectedError("; ".join(hanging))
             moving = [state.name for state in self.states().values() if state.in_motion]
             if moving:
                 raise NotAvailable(f"{', '.join(moving)} is moving; stop it before a rescan")
