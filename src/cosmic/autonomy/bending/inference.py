@@ -40,14 +40,15 @@ WEIGHED: Final = 1e-4
 
 UNLIKELY: Final = 1e-3
 TWISTED: Final = 0.25
-"""Of what friction does to a section askew: the part that differs between spans, by twist."""
+"""Of what friction does to a section askew: the part that differs between spans, by twist; it may
+be seen to differ by more."""
 
-TWISTED_LEAST: Final = 0.03
+TWISTED_LEAST: Final = 0.015
 
 TURNED_PART: Final = 1.0
-TURNED_LEAST: Final = 0.1
+TURNED_LEAST: Final = 0.01
 """How far friction that holds a section askew may have turned round on the way back, as a part of
-what it did on the way out; and at least, of ln(k)."""
+what it did on the way out; and at least, of ln(k), beside how well that is known."""
 
 ALONG: Final = ("friction along, once it let go", "")
 
@@ -283,7 +284,8 @@ def _freed(fits: Sequence[SpanFit], rows: Sequence["_Row"]) -> tuple[Floats, Flo
         return None
     weights = 1.0 / np.maximum(stds[known], LEAST_STD) ** 2
     mean = float(weights @ logs[known] / weights.sum())
-    twisted = math.hypot(TWISTED * mean, TWISTED_LEAST)
+    seen = _between(logs[known], weights)
+    twisted = math.hypot(TWISTED * mean, TWISTED_LEAST, seen)
     # A slide of a short span tells little: it is taken together with what the others show.
     by_others = math.hypot(twisted, float(weights.sum() ** -0.5))
     own = np.where(known, by_others**2 / (by_others**2 + np.where(known, stds, 0.0) ** 2), 0.0)
@@ -293,9 +295,22 @@ def _freed(fits: Sequence[SpanFit], rows: Sequence["_Row"]) -> tuple[Floats, Flo
     out = np.array([each.sign > 0.0 for each in rows])
     of_out = np.diag(stds[span] ** 2) * np.outer(out, out)
     same = span[:, None] == span[None, :]
-    turned = np.where(out, 0.0, np.hypot(TURNED_PART * logs, TURNED_LEAST)[span])
+    most = np.hypot(TURNED_PART * np.hypot(logs, stds), TURNED_LEAST)
+    turned = np.where(out, 0.0, most[span])
     back = np.outer(turned, turned) * (0.5 + 0.5 * same)
     return logs[span] * out, np.asarray(of_out + back)
+
+
+def _between(values: Floats, weights: Floats) -> float:
+    """Return by how much values differ beyond what their weights allow, one standard deviation.
+
+    After DerSimonian and Laird.
+    """
+    total = float(weights.sum())
+    mean = float(weights @ values) / total
+    beyond = float(weights @ (values - mean) ** 2) - (len(values) - 1)
+    free = total - float(weights @ weights) / total
+    return math.sqrt(beyond / free) if beyond > 0.0 and free > 0.0 else 0.0
 
 
 def _between_branches(span: np.ndarray, log_k: Floats) -> Floats:

@@ -128,6 +128,13 @@ TINY_UN: Final = 0.01
 SLIDE_TIMES: Final = 2.0
 """So many times as far as it is pressed a fibre is slid at least: half of friction times how much
 more a ribbon gives way in its other plane."""
+SLIDE_WELL_TIMES: Final = 4.0
+"""The same where there is a choice: farther pressed, the force tells more than the stages creep."""
+SLIDE_PART: Final = 0.5
+"""Of the push, and of the highest force: a fibre is pressed by no more to be slid, for friction
+bends it up or down beside."""
+CLOSE_PART: Final = 0.2
+"""Of how far it is to be pressed: near enough."""
 GROWTH: Final = 1.5
 """How much more than the step before one step may add, when the next is foreseen."""
 
@@ -343,7 +350,7 @@ class OneSpan:
         self._note_contact(self._met_um(free_um), MET_STD_UM)
 
     def _slide(self, base_un: float, free_um: float) -> Steps:
-        """Slide the fibre up and down the probe under a small force, and leave it again.
+        """Slide the fibre up and down the probe as it is pressed a little, and leave it again.
 
         Friction holds a section that stands askew, and makes it too stiff; what the force is once
         that was made to let go tells by how much. The fibre comes back to where it was each time.
@@ -386,15 +393,23 @@ class OneSpan:
     def _press(
         self, base_un: float, free_um: float
     ) -> Generator[Yielded, object, ForceMean | None]:
-        """Push until the force is clear; None: so far that no slide would make it let go."""
+        """Push until the force tells much; None: so far that no slide would make it let go."""
         push, step, before = self._push, min(self._step_um(), FINE_UM), 0.0
         probe_um = free_um
+        wanted_um = min(push.slide_um / SLIDE_WELL_TIMES, SLIDE_PART * self._plan.stroke_um)
         for _ in range(PRESSES):
             probe_um, mean = yield from self._to(probe_um + step, push.average_s, loading=True)
             force = mean.mean_un - base_un
             if force >= push.slide_un:
-                pressed = step * force / max(force - before, TINY_UN)
-                return mean if pressed <= push.slide_um / SLIDE_TIMES else None
+                rise = max(force - before, TINY_UN)
+                # It was met somewhere within a step that begins free of it.
+                pressed = step * (force / rise if before > push.contact_un else 0.5)
+                left_um = wanted_um - pressed
+                if left_um <= CLOSE_PART * wanted_um or (
+                    force + GROWTH * rise > SLIDE_PART * push.limit_un
+                ):
+                    return mean if pressed <= push.slide_um / SLIDE_TIMES else None
+                step = min(step, left_um)
             before = max(force, 0.0)
         return None
 

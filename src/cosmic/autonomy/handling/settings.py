@@ -218,9 +218,9 @@ class PushSettings(StrictModel):
         How long the probe stays where it pushed farthest, and how often the force is read
         meanwhile: it shows how the fibre relaxes.
     slide_um, slide_every, slide_un : float, int, float
-        How far a pushed fibre is slid up and down the probe, and back to where it was, so that
-        friction lets go of it (0: it is not); at every how many spans; and from which force above
-        the baseline on.
+        How far a fibre that is pressed by a quarter of that, or by half of its push, is slid up and
+        down the probe, and back to where it was, so that friction lets go of it (0: it is not); at
+        every how many spans; and from which force above the baseline on.
     rest_s : float
         How long stages that came from far rest before the first push of a fibre.
     retreat_um : float

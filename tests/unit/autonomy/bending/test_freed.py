@@ -53,6 +53,41 @@ def test_spans_that_were_not_slid_are_taken_to_be_held_like_the_others_and_less_
     assert half_width_percent(one_slid) > half_width_percent(all_slid)
 
 
+def askew_stds(spans: list[Span]) -> np.ndarray:
+    """Return how well both ways of each span are known beside what friction holds, of ln(k)."""
+    readings = measure_fibre(spans, settings=FitSettings()).readings
+    assert readings is not None
+    return np.asarray(np.sqrt(np.diag(readings.askew)).reshape(-1, 2))
+
+
+def test_where_slides_differ_less_is_known_of_the_spans_between() -> None:
+    spans = sorted(pushed(rig()), key=lambda each: -each.nominal_um)
+
+    def between(*parts: float) -> float:
+        slid = [
+            held(each, up=part, down=part) for each, part in zip(spans[::2], parts, strict=True)
+        ]
+        return float(askew_stds([slid[0], held(spans[1]), *slid[1:]])[1, 0])
+
+    alike, unlike = between(0.8, 0.8, 0.8), between(0.7, 0.8, 0.9)
+    apart = float(np.std(np.log([0.7, 0.8, 0.9]), ddof=1))
+    assert alike < 0.08
+    assert 0.9 * apart < unlike < 1.5 * apart
+
+
+def test_the_way_back_counts_by_how_well_slides_show_that_nothing_is_held() -> None:
+    def back(noise_un: float) -> np.ndarray:
+        spans = []
+        for span in pushed(rig()):
+            as_before = span.force_un[[AFTER]]
+            freed = Freed(AFTER, as_before, as_before, noise_un, 0.2)
+            spans.append(dataclasses.replace(span, freed=freed))
+        return askew_stds(spans)[:, 1]
+
+    assert (back(0.02) < 0.05).all()
+    assert (back(2.0) > 1.5 * back(0.02)).all()
+
+
 def test_a_slide_where_little_was_pushed_is_known_less_well() -> None:
     span = held(pushed(rig())[0], up=0.9, down=0.9)
     level = np.full(len(span.probe_um), LEVEL_UN)

@@ -235,6 +235,15 @@ def test_the_stiffness_is_found_and_the_sensor_spared(ei_n_m2: float, off_um: fl
     assert found.ei_low_n_m2 < ei_n_m2 < found.ei_high_n_m2
 
 
+@pytest.mark.parametrize("off_um", [0.0, 1.5, 3.0, 4.5, 6.0, 7.5])
+@pytest.mark.parametrize("ei_n_m2", [3e-11, 3e-10])
+def test_a_fibre_is_slid_wherever_in_a_step_of_the_search_it_was_met(ei_n_m2: float, off_um: float):
+    bench = Bench(ei_n_m2, off_um=off_um)
+    carried_out(PushSpans().run(bench))
+    spans = bench.held_fibre().spans
+    assert [each.freed is not None for each in spans] == [True, False, True, False, True]
+
+
 def test_every_other_span_is_slid_up_and_down_and_comes_back_to_where_it_was():
     bench = Bench(5e-11)
     carried_out(PushSpans().run(bench))
@@ -248,6 +257,27 @@ def test_every_other_span_is_slid_up_and_down_and_comes_back_to_where_it_was():
         assert span.freed.up_un.mean() == pytest.approx(before, abs=0.3)
         assert span.freed.down_un.mean() == pytest.approx(before, abs=0.3)
     assert sorted(bench.heights_um) == pytest.approx([-820.0] * 3 + [-810.0] * 6 + [-800.0] * 3)
+
+
+@pytest.mark.parametrize("ei_n_m2", [1e-12, 5e-11, 4e-10])
+def test_a_fibre_is_slid_where_it_is_pressed_far_enough_and_by_half_of_its_push(ei_n_m2: float):
+    bench = Bench(ei_n_m2)
+    carried_out(PushSpans().run(bench))
+    slid = [each for each in bench.held_fibre().spans if each.freed is not None]
+    assert slid
+    for span in slid:
+        assert span.freed is not None
+        k_un_um = 1.0 / (
+            (span.nominal_um + CLAMP_UM) ** 3 / (3.0 * ei_n_m2 * 1e18) + 1.0 / SENSOR_UN_UM
+        )
+        before_un = span.force_un[span.freed.after] - ZERO_UN
+        pressed_um, stroke_um = before_un / k_un_um, float(np.ptp(span.force_un)) / k_un_um
+        wanted_um = min(bench.settings.push.slide_um / 4.0, 0.5 * stroke_um)
+        assert pressed_um > 0.65 * wanted_um
+        # Of a soft fibre the force is small at first, and it is pressed until it is clear.
+        assert pressed_um < 1.35 * max(wanted_um, bench.settings.push.slide_un / k_un_um) + 0.5
+        assert pressed_um <= 0.6 * bench.settings.push.slide_um
+        assert before_un <= 0.6 * bench.settings.push.limit_un
 
 
 def test_a_fibre_that_left_the_probe_as_it_was_slid_is_measured_without():
