@@ -208,8 +208,8 @@ class Teleoperation:
         Raises
         ------
         NotAvailable
-            There is no such profile, or the device has none of its inputs; motion is stopped, or
-            MiCo is not ready.
+            There is no such profile, or the device of that key has none of its inputs; motion is
+            stopped, or MiCo is not ready.
         NotConnectedError
             The device is not there.
         """
@@ -219,7 +219,8 @@ class Teleoperation:
             self._refuse_if_not_ready()
             opened = self.sources.open(device) if isinstance(device, str) else device
             try:
-                _refuse_if_nothing_steers(opened, chosen)
+                if opened is not device:  # what a script opened itself may have inputs it names not
+                    _refuse_if_nothing_steers(opened, chosen)
                 steering = self._steering(opened, chosen)
             except BaseException:
                 opened.close()
