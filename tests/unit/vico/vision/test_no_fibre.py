@@ -33,6 +33,24 @@ def test_a_fibre_on_a_sharpened_image_is_certain() -> None:
     assert found.certain
 
 
+@pytest.mark.parametrize("level", [0, 40, 255])
+@pytest.mark.parametrize("kind", [cv2.LINE_8, cv2.LINE_AA])
+def test_a_line_that_is_drawn_aslant_is_not_certain(level: int, kind: int) -> None:
+    image = drawn_image([], [])
+    curve = np.round(arc((120.0, 120.0), 0.5, 320.0, 0.5)).astype(np.int32)
+    cv2.polylines(image, [curve], isClosed=False, color=level, thickness=8, lineType=kind)
+    (found,) = find_fibres(image)
+    assert DRAWN in found.doubts
+
+
+@pytest.mark.parametrize("contrast", [-250.0, 250.0])
+def test_a_fibre_as_dark_or_light_as_the_camera_can_tell_is_certain(contrast: float) -> None:
+    lines = [arc((120.0, 120.0), 0.5, 320.0, 0.5)]
+    image = drawn_image(lines, [9.0], contrast=contrast, blur_px=0.75)
+    (found,) = find_fibres(image)
+    assert found.certain
+
+
 def test_several_lines_along_rows_and_columns_are_drawn() -> None:
     down = np.column_stack([np.full(400, 120.0), np.linspace(100.0, 200.0, 400)])
     along = np.column_stack([np.linspace(300.0, 420.0, 400), np.full(400, 380.0)])
