@@ -33,7 +33,7 @@ SHARE: Final = 0.07
 SOFT_BLURS: Final = 3.0
 SOFT_WIDTHS: Final = 0.6
 # Of the fibre's contrast, from which what lies before an end is something.
-COVER_SHARE: Final = 0.1
+COVER_SHARE: Final = 0.04
 # Widths from an end within which the ground beside it is looked at, and to where it may slope.
 BESIDE: Final = (1.0, 4.0)
 DEEP_WIDTHS: Final = 12.0
