@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from cosmic.vico.core.vision.checks import COPY, DRAWN, EMBOSSED
+from cosmic.vico.core.vision.checks import COPY, DRAWN, EMBOSSED, UNEVEN
 from cosmic.vico.core.vision.finding import find_fibres
 from unit.vico.vision.drawn_fibres import arc, drawn_image, strip
 
@@ -49,6 +49,24 @@ def test_a_fibre_as_dark_or_light_as_the_camera_can_tell_is_certain(contrast: fl
     image = drawn_image(lines, [9.0], contrast=contrast, blur_px=0.75)
     (found,) = find_fibres(image)
     assert found.certain
+
+
+def test_a_row_of_drops_that_touch_is_not_certain() -> None:
+    along = np.arange(90.0, 290.0, 16.2)
+    rows, columns = np.mgrid[0:300, 0:400]
+    drops = np.min([np.hypot(columns - each, rows - 150) for each in along], axis=0) < 9.0
+    image = cv2.GaussianBlur(170.0 - 80.0 * drops, (0, 0), 1.0)
+    image += np.random.default_rng(1).normal(0.0, 1.5, image.shape)
+    (found,) = find_fibres(image.astype(np.uint8))
+    assert UNEVEN in found.doubts
+
+
+def test_a_word_is_not_certain() -> None:
+    ink = np.zeros((300, 400), np.uint8)
+    cv2.putText(ink, "abcdefgh", (150, 160), cv2.FONT_HERSHEY_DUPLEX, 0.7, 255, 3, cv2.LINE_AA)
+    image = cv2.GaussianBlur(170.0 - 80.0 * (ink / 255.0), (0, 0), 1.5)
+    image += np.random.default_rng(1).normal(0.0, 1.5, image.shape)
+    assert all(UNEVEN in each.doubts for each in find_fibres(image.astype(np.uint8)))
 
 
 def test_several_lines_along_rows_and_columns_are_drawn() -> None:
