@@ -44,7 +44,7 @@ def test_a_line_that_is_drawn_aslant_is_not_certain(level: int, kind: int) -> No
 
 
 @pytest.mark.parametrize("contrast", [-250.0, 250.0])
-def test_a_fibre_as_dark_or_light_as_the_camera_can_tell_is_certain(contrast: float) -> None:
+def test_a_fibre_at_an_end_of_the_range_of_grey_is_certain(contrast: float) -> None:
     lines = [arc((120.0, 120.0), 0.5, 320.0, 0.5)]
     image = drawn_image(lines, [9.0], contrast=contrast, blur_px=0.75)
     (found,) = find_fibres(image)
