@@ -34,6 +34,8 @@ SOFT_BLURS: Final = 3.0
 SOFT_WIDTHS: Final = 0.6
 # Of the fibre's contrast, from which what lies before an end is something.
 COVER_SHARE: Final = 0.04
+# The same on an image as JPEG, which leaves seams of its own around what is dark.
+COMPRESSED_COVER_SHARE: Final = 0.1
 # Widths from an end within which the ground beside it is looked at, and to where it may slope.
 BESIDE: Final = (1.0, 4.0)
 DEEP_WIDTHS: Final = 12.0
@@ -61,7 +63,7 @@ def soft(course: Course) -> float:
     return max([0.0, *(end.soft_px / usual for end in course.ends if end.kind is EndKind.FREE)])
 
 
-def is_covered(scene: Scene, course: Course) -> bool:
+def is_covered(scene: Scene, course: Course, *, compressed: bool) -> bool:
     """Return whether the ground before a free end is lighter than beside a darker fibre.
 
     (Darker, for a lighter one.) What sharpening leaves before an end it leaves beside it as well.
@@ -69,7 +71,8 @@ def is_covered(scene: Scene, course: Course) -> bool:
     contrast = middle(course.contrast[course.good]) if course.good.any() else 1.0
     size = max(4.0, 0.8 * course.width)
     first = 1.5 * course.edge_blur_px + 1.0
-    least = max(COVER_SHARE * contrast, TIMES * course.noise / size)
+    share = COMPRESSED_COVER_SHARE if compressed else COVER_SHARE
+    least = max(share * contrast, TIMES * course.noise / size)
     away = first + np.arange(size)
     for at, end in zip((0, -1), course.ends, strict=True):
         if end.kind is not EndKind.FREE:
