@@ -19,10 +19,12 @@ def only(image: np.ndarray) -> Fibre:
     return found
 
 
-def spotted(image: np.ndarray, at: np.ndarray, radius: float, level: float) -> np.ndarray:
+def spotted(
+    image: np.ndarray, at: np.ndarray, radius: float, level: float, noise: float = 3.0
+) -> np.ndarray:
     """Return an image with a round spot of dirt, its rim a little soft."""
     share = 1.0 / (1.0 + np.exp((np.hypot(COLUMNS - at[0], ROWS - at[1]) - radius) / 0.8))
-    rough = np.random.default_rng(11).normal(0.0, 3.0, SHAPE)
+    rough = np.random.default_rng(11).normal(0.0, noise, SHAPE)
     mixed = image * (1.0 - share) + (level + rough) * share
     return np.clip(np.round(mixed), 0, 255).astype(np.uint8)
 
@@ -34,6 +36,30 @@ def test_an_end_that_dirt_of_the_other_shade_covers_is_doubted(bright: bool, rad
     image = drawn_image([LINE], [9.0], contrast=contrast, ground=ground)
     assert only(image).certain
     assert COVERED in only(spotted(image, LINE[-1], radius, dirt)).doubts
+
+
+@pytest.mark.parametrize("contrast", [-60.0, 60.0])
+def test_dirt_nearly_as_light_as_the_ground_over_an_end_is_doubted(contrast: float) -> None:
+    image = drawn_image([LINE], [9.0], contrast=contrast, noise=1.0)
+    assert only(image).certain
+    dirt = 150.0 - 0.07 * contrast
+    assert COVERED in only(spotted(image, LINE[-1], 14.0, dirt, noise=1.0)).doubts
+
+
+@pytest.mark.parametrize("falls_off", [-0.4, 0.4])
+def test_light_that_falls_off_along_a_fibre_covers_no_end(falls_off: float) -> None:
+    light = 1.0 + falls_off * (COLUMNS / 640.0 - 0.5)
+    even = drawn_image([LINE], [14.0], contrast=-30.0, ground=190.0, noise=1.0)
+    assert only(np.clip(np.round(even * light), 0, 255).astype(np.uint8)).certain
+    covered = spotted(even, LINE[-1], 14.0, 205.0)
+    assert COVERED in only(np.clip(np.round(covered * light), 0, 255).astype(np.uint8)).doubts
+
+
+def test_a_line_thinner_than_a_step_along_it_is_measured() -> None:
+    image = np.full((300, 400), 150.0)
+    image[150, 60:340] = 60.0
+    image += np.random.default_rng(3).normal(0.0, 6.0, image.shape)
+    assert only(image.astype(np.uint8)).length_px == pytest.approx(280.0, abs=2.0)
 
 
 def test_a_fragment_behind_dirt_makes_the_fibre_doubtful() -> None:

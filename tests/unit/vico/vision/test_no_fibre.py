@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from cosmic.vico.core.vision.checks import COPY, DRAWN, EMBOSSED
+from cosmic.vico.core.vision.checks import COPY, DRAWN, EMBOSSED, UNEVEN
 from cosmic.vico.core.vision.finding import find_fibres
 from unit.vico.vision.drawn_fibres import arc, drawn_image, strip
 
@@ -31,6 +31,42 @@ def test_a_fibre_on_a_sharpened_image_is_certain() -> None:
     seam = image + 1.0 * (image - cv2.GaussianBlur(image, (0, 0), 2.0))
     (found,) = find_fibres(np.clip(np.round(seam), 0, 255).astype(np.uint8))
     assert found.certain
+
+
+@pytest.mark.parametrize("level", [0, 40, 255])
+@pytest.mark.parametrize("kind", [cv2.LINE_8, cv2.LINE_AA])
+def test_a_line_that_is_drawn_aslant_is_not_certain(level: int, kind: int) -> None:
+    image = drawn_image([], [])
+    curve = np.round(arc((120.0, 120.0), 0.5, 320.0, 0.5)).astype(np.int32)
+    cv2.polylines(image, [curve], isClosed=False, color=level, thickness=8, lineType=kind)
+    (found,) = find_fibres(image)
+    assert DRAWN in found.doubts
+
+
+@pytest.mark.parametrize("contrast", [-250.0, 250.0])
+def test_a_fibre_at_an_end_of_the_range_of_grey_is_certain(contrast: float) -> None:
+    lines = [arc((120.0, 120.0), 0.5, 320.0, 0.5)]
+    image = drawn_image(lines, [9.0], contrast=contrast, blur_px=0.75)
+    (found,) = find_fibres(image)
+    assert found.certain
+
+
+def test_a_row_of_drops_that_touch_is_not_certain() -> None:
+    along = np.arange(90.0, 290.0, 16.2)
+    rows, columns = np.mgrid[0:300, 0:400]
+    drops = np.min([np.hypot(columns - each, rows - 150) for each in along], axis=0) < 9.0
+    image = cv2.GaussianBlur(170.0 - 80.0 * drops, (0, 0), 1.0)
+    image += np.random.default_rng(1).normal(0.0, 1.5, image.shape)
+    (found,) = find_fibres(image.astype(np.uint8))
+    assert UNEVEN in found.doubts
+
+
+def test_a_word_is_not_certain() -> None:
+    ink = np.zeros((300, 400), np.uint8)
+    cv2.putText(ink, "abcdefgh", (150, 160), cv2.FONT_HERSHEY_DUPLEX, 0.7, 255, 3, cv2.LINE_AA)
+    image = cv2.GaussianBlur(170.0 - 80.0 * (ink / 255.0), (0, 0), 1.5)
+    image += np.random.default_rng(1).normal(0.0, 1.5, image.shape)
+    assert all(UNEVEN in each.doubts for each in find_fibres(image.astype(np.uint8)))
 
 
 def test_several_lines_along_rows_and_columns_are_drawn() -> None:

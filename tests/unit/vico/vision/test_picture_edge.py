@@ -31,6 +31,14 @@ def cut_image(
     return np.round(image * (1.0 - share) + fill * share).astype(np.uint8)
 
 
+def test_fibres_are_looked_for_on_a_round_picture_whose_rim_is_large_and_dark() -> None:
+    line = arc((60.0, 100.0), 0.6, 520.0, 0.0)
+    image = drawn_image([line], [14.0], shape=(480, 560), contrast=-70.0, noise=1.0)
+    away = np.hypot(ROWS - 240, COLUMNS - 280)[:, :560]
+    light = 1.0 - 0.15 * (away / 182.0) ** 2
+    assert CUT in doubts(np.where(away < 182.0, image * light, 255.0).astype(np.uint8))
+
+
 def doubts(image: np.ndarray) -> set[str]:
     """Return what is doubtful of the longest fibre on an image, where nothing is certain."""
     found = find_fibres(image)

@@ -13,7 +13,7 @@ from scipy.ndimage import maximum_filter1d, median_filter
 from cosmic.vico.core.vision.ends import EndKind, bent, leaving
 from cosmic.vico.core.vision.grey import Floats, Mask, middle
 from cosmic.vico.core.vision.profiles import Flags, Scene, sample, within
-from cosmic.vico.core.vision.refine import Course
+from cosmic.vico.core.vision.refine import STEP_PX, Course
 from cosmic.vico.core.vision.smoothing import directions
 
 GOES_ON = "something thinner or fainter goes on beyond an end: it may be a part of a fibre"
@@ -33,7 +33,12 @@ SHARE: Final = 0.07
 SOFT_BLURS: Final = 3.0
 SOFT_WIDTHS: Final = 0.6
 # Of the fibre's contrast, from which what lies before an end is something.
-COVER_SHARE: Final = 0.1
+COVER_SHARE: Final = 0.04
+# The same on an image as JPEG, which leaves seams of its own around what is dark.
+COMPRESSED_COVER_SHARE: Final = 0.1
+# Widths from an end within which the ground beside it is looked at, and to where it may slope.
+BESIDE: Final = (1.0, 4.0)
+DEEP_WIDTHS: Final = 12.0
 
 
 def goes_on(scene: Scene, course: Course, explained: Mask) -> float:
@@ -58,7 +63,7 @@ def soft(course: Course) -> float:
     return max([0.0, *(end.soft_px / usual for end in course.ends if end.kind is EndKind.FREE)])
 
 
-def is_covered(scene: Scene, course: Course) -> bool:
+def is_covered(scene: Scene, course: Course, *, compressed: bool) -> bool:
     """Return whether the ground before a free end is lighter than beside a darker fibre.
 
     (Darker, for a lighter one.) What sharpening leaves before an end it leaves beside it as well.
@@ -66,7 +71,8 @@ def is_covered(scene: Scene, course: Course) -> bool:
     contrast = middle(course.contrast[course.good]) if course.good.any() else 1.0
     size = max(4.0, 0.8 * course.width)
     first = 1.5 * course.edge_blur_px + 1.0
-    least = max(COVER_SHARE * contrast, TIMES * course.noise / size)
+    share = COMPRESSED_COVER_SHARE if compressed else COVER_SHARE
+    least = max(share * contrast, TIMES * course.noise / size)
     away = first + np.arange(size)
     for at, end in zip((0, -1), course.ends, strict=True):
         if end.kind is not EndKind.FREE:
@@ -74,13 +80,31 @@ def is_covered(scene: Scene, course: Course) -> bool:
         line = course.line if at else course.line[::-1]
         half = max(1.0, 0.4 * course.width)
         before = _level(scene, line, away, np.arange(-half, half + 0.5))
-        inner = -np.arange(course.width, 4.0 * course.width)
+        inner = -np.arange(BESIDE[0] * course.width, BESIDE[1] * course.width)
         beside = [
             _level(scene, line, inner, side * (0.5 * course.width + away)) for side in (-1.0, 1.0)
         ]
-        if min(beside) - before > least:
+        ground = scene.sign * (course.ground if at else course.ground[::-1])
+        further = float(away.mean()) + 0.5 * sum(BESIDE) * course.width
+        if min(beside) + further * _slope(ground, course.width) - before > least:
             return True
     return False
+
+
+def _slope(ground: Floats, width: float) -> float:
+    """Return by how much the ground changes in a pixel towards an end; 0 where it is short.
+
+    The light of an image falls off to a side. What is measured lies where the ground beside the
+    end is, and further inside, so that it does not show what covers the end.
+    """
+    near, far, deepest = (
+        max(0, len(ground) - int(each * width / STEP_PX)) for each in (*BESIDE, DEEP_WIDTHS)
+    )
+    beside, inside = ground[far:near], ground[deepest:far]
+    if not 0 < len(beside) <= len(inside):
+        return 0.0
+    apart_px = 0.5 * STEP_PX * (len(beside) + len(inside))
+    return (middle(beside) - middle(inside)) / apart_px
 
 
 def _level(scene: Scene, line: Floats, along: Floats, across: Floats) -> float:

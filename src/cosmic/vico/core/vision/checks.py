@@ -9,6 +9,7 @@ from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.grey import Floats, middle, middles, quantile
 from cosmic.vico.core.vision.profiles import Scene, sample
 from cosmic.vico.core.vision.refine import STEP_PX, Course
+from cosmic.vico.core.vision.smoothing import levelled
 
 OUT_OF_FOCUS = "out of focus: its edges are blurred over a large part of its width"
 FAINT = "hardly stands out from the noise"
@@ -24,7 +25,7 @@ PARTED = "it may be two fibres side by side: the ground shows between its edges"
 RUNS_ON = (EndKind.BODY, EndKind.LOST)
 EDGING = "it lies along the edge of something wider"
 DIRTY_END = "at an end its edges are not seen: dirt may lie there"
-DRAWN = "it is as straight and as even as a line drawn into the picture: a scale bar, or a frame"
+DRAWN = "it is as even as what is drawn into a picture: a scale bar, a line, a letter, or a frame"
 COPY = "another one has the same shape: it may be a reflection, or a mark that was drawn"
 SHARP = "it bends more sharply than its own width"
 EMBOSSED = "a dark band and a light one lie along each other: a scratch, or lit from a side"
@@ -47,6 +48,8 @@ class Limits:
     levels: float = 4.0
     fade: float = 0.55
     width_spread: float = 0.3
+    bumps: float = 0.08
+    bumps_px: float = 0.5
     seen: float = 0.6
     gap_widths: float = 14.0
     other_side: float = 0.2
@@ -74,7 +77,7 @@ def doubts_of(course: Course, step: float) -> list[str]:
         (typical < max(LIMITS.contrast_to_noise * course.noise, LIMITS.levels * step), FAINT),
         (fades(course, typical), FADES),
         (dirty_end(course), DIRTY_END),
-        (width_spread(course) > LIMITS.width_spread, UNEVEN),
+        (width_spread(course) > LIMITS.width_spread or bumpy(course), UNEVEN),
         (float(seen.mean()) < LIMITS.seen, UNSEEN),
         (hidden_px > max(30.0, LIMITS.gap_widths * course.width), HIDDEN_STRETCH),
         (sharpest_turn(course) > LIMITS.turn, SHARP),
@@ -157,6 +160,19 @@ def width_spread(course: Course) -> float:
         return 1.0
     low, high = quantile(widths, 0.16), quantile(widths, 0.84)
     return 0.5 * (high - low) / max(middle(widths), 1e-6)
+
+
+def bumpy(course: Course) -> bool:
+    """Return whether the width goes up and down within a few widths.
+
+    So it does along a word, or a row of beads, whose joints are no more than their own unevenness.
+    """
+    widths = course.widths[np.isfinite(course.widths)]
+    if len(widths) < 4:
+        return True
+    around = levelled(widths, 2 * int(3.0 * course.width / STEP_PX) + 1)
+    spread = 1.4826 * middle(np.abs(widths - around))
+    return spread > max(LIMITS.bumps * course.width, LIMITS.bumps_px)
 
 
 def longest_gap(seen: np.ndarray) -> int:

@@ -320,7 +320,7 @@ def doubts_by_itself(
         (section.hollow > MOST_HOLLOW, checks.PARTED),
         (touches_border(scene, course), EndKind.BORDER.value),
         (picture_edge.is_cut(scene, course, explained, compressed=compressed), picture_edge.CUT),
-        (beyond.is_covered(scene, course), beyond.COVERED),
+        (beyond.is_covered(scene, course, compressed=compressed), beyond.COVERED),
     )
     return [reason for doubtful, reason in reasons if doubtful]
 

@@ -10,12 +10,19 @@ from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.grey import Floats, middle
 from cosmic.vico.core.vision.profiles import Scene, sample
 from cosmic.vico.core.vision.refine import Course
-from cosmic.vico.core.vision.smoothing import arc_lengths
+from cosmic.vico.core.vision.smoothing import arc_lengths, directions
 
 ASLANT_PX: Final = 0.3
 SEVERAL_ASLANT_PX: Final = 0.5
 SEVERAL_ASLANT: Final = 2e-3
 EVEN_OF_NOISE: Final = 0.8
+ONE_LEVEL: Final = 0.98
+"""Of the pixels inside, that are as grey as each other."""
+NO_LENS_PX: Final = 0.6
+"""Edges are sharper than this where no lens has drawn them. Where a fibre is as light as the
+camera can tell, its pixels are alike too, and its edges are not as sharp."""
+NOISY_STEPS: Final = 0.3
+"""Steps of grey, from which noise of the ground would show inside as well."""
 POINTS: Final = 9
 """At which courses are compared."""
 ALIKE_PX: Final = 1.5
@@ -27,15 +34,16 @@ MARKS: Final = 3
 
 
 def drawn(scene: Scene, courses: Sequence[Course]) -> set[int]:
-    """Return the lines that are drawn along rows or columns.
+    """Return the lines that are drawn into the image.
 
-    They have less noise than the ground; or there are several, from end to end on the image or
-    from border to border: so many fibres do not come to lie like that.
+    They are of one level with sharp edges on a ground with noise. Those along rows or columns have
+    less noise than the ground; or there are several, from end to end on the image or from border
+    to border: so many fibres do not come to lie like that.
     """
     even, whole = set(), set()
     for index, course in enumerate(courses):
         aside, length = np.sort(np.ptp(course.line, axis=0)).tolist()
-        if aside <= ASLANT_PX and _is_even(scene, course):
+        if (aside <= ASLANT_PX and _is_even(scene, course)) or _is_of_one_level(scene, course):
             even.add(index)
         kinds = {end.kind for end in course.ends}
         if aside <= max(SEVERAL_ASLANT_PX, SEVERAL_ASLANT * length) and (
@@ -53,6 +61,21 @@ def _is_even(scene: Scene, course: Course) -> bool:
     inner = levels[len(levels) // 8 : len(levels) - len(levels) // 8]
     spread = 1.4826 * middle(np.abs(inner - middle(inner)))
     return spread < EVEN_OF_NOISE * course.noise
+
+
+def _is_of_one_level(scene: Scene, course: Course) -> bool:
+    """Return whether the pixels inside are alike, and its edges sharper than through a lens."""
+    if not (course.blur_px < NO_LENS_PX and course.noise > NOISY_STEPS * scene.step):
+        return False
+    tangent = directions(course.line)
+    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+    part = slice(len(normal) // 8, len(normal) - len(normal) // 8)
+    away = np.arange(0.0, 0.25 * course.width)
+    away = np.concatenate([-away[:0:-1], away])
+    points = course.line[part, None] + away[:, None] * normal[part, None]
+    x, y = np.clip(np.round(points), 0, scene.corner).astype(int).reshape(-1, 2).T
+    levels = scene.image[y, x].astype(np.float64)
+    return float((levels == middle(levels)).mean()) > ONE_LEVEL
 
 
 def copied(courses: Sequence[Course]) -> set[int]:

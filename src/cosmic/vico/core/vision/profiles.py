@@ -1,6 +1,7 @@
 """Grey levels across a fibre, and the edges in them."""
 
 from dataclasses import dataclass
+from typing import Final
 
 import cv2
 import numpy as np
@@ -8,6 +9,9 @@ import numpy.typing as npt
 
 from cosmic.vico.core.vision.grey import Floats, Floats32, middle, middles
 from cosmic.vico.core.vision.smoothing import directions, softened
+
+AT_ONCE: Final = 32000
+"""OpenCV takes grey levels at fewer than 32767 rows or columns of points at once."""
 
 Flags = npt.NDArray[np.bool_]
 
@@ -61,7 +65,12 @@ class Edges:
 
 
 def sample(image: Floats32, x: Floats32, y: Floats32) -> Floats32:
-    """Return grey levels at points, the border repeated outside."""
+    """Return grey levels at points, shape (n, m), the border repeated outside."""
+    longer = int(np.argmax(x.shape))
+    if x.shape[longer] > AT_ONCE:
+        count = -(-x.shape[longer] // AT_ONCE)
+        parts = zip(*(np.array_split(each, count, axis=longer) for each in (x, y)), strict=True)
+        return np.concatenate([sample(image, *part) for part in parts], axis=longer)
     found = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(found, dtype=np.float32)
 
