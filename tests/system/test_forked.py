@@ -65,7 +65,7 @@ import cosmic
 with cosmic.connect(applications=("mico",), stations=["st=" + sys.argv[1]]) as rig:
     rig.take_control()
     mico, axis = rig.mico, rig.mico["left.x"]
-    print("parent", round(axis.move_to(20.0)))
+    print("parent", round(axis.move_to(20.0)), flush=True)  # or the child has it too
     child = os.fork()
     if child == 0:
         tried("move", lambda: axis.move_to(500.0))

@@ -331,7 +331,9 @@ class TeleoperationPanel(QWidget):
         else:
             try:
                 self._on_attention()
-                self._teleoperation.start(self.devices.currentData(), self.profiles.currentText())
+                device, profile = self.devices.currentData(), self.profiles.currentText()
+                self._teleoperation.check_inputs(device, profile)
+                self._teleoperation.start(device, profile)
             except CosmicError as exc:
                 self._say(str(exc))
         self.refresh()

@@ -198,6 +198,23 @@ class Teleoperation:
         self.set_profile(profile)
         return profile
 
+    def check_inputs(self, key: str, profile: str) -> None:
+        """See that a device can steer something: else it would be armed, and move nothing.
+
+        Raises
+        ------
+        NotAvailable
+            The device has none of the inputs of the profile, or there is no such profile.
+        """
+        wanted = [each.input for each in self.profile(profile).axis]
+        device = next((each for each in self.devices() if each.key == key), None)
+        there = () if device is None else device.axes
+        if device is not None and there and wanted and not set(wanted) & set(there):
+            raise NotAvailable(
+                f"{device.title} has none of the inputs of profile {profile!r}, "
+                f"{', '.join(wanted)}; it has {', '.join(there)}. Choose another device or profile"
+            )
+
     # Running
 
     def start(self, device: str | InputDevice, profile: str) -> None:
@@ -208,8 +225,7 @@ class Teleoperation:
         Raises
         ------
         NotAvailable
-            There is no such profile, or the device of that key has none of its inputs; motion is
-            stopped, or MiCo is not ready.
+            There is no such profile, motion is stopped, or MiCo is not ready.
         NotConnectedError
             The device is not there.
         """
@@ -219,8 +235,6 @@ class Teleoperation:
             self._refuse_if_not_ready()
             opened = self.sources.open(device) if isinstance(device, str) else device
             try:
-                if opened is not device:  # what a script opened itself may have inputs it names not
-                    _refuse_if_nothing_steers(opened, chosen)
                 steering = self._steering(opened, chosen)
             except BaseException:
                 opened.close()
@@ -331,14 +345,3 @@ class Teleoperation:
         self._end_stops()
         self.stop()
         self.sources.close()
-
-
-def _refuse_if_nothing_steers(device: InputDevice, profile: TeleoperationProfileSettings) -> None:
-    """Refuse a device that would be armed and move nothing, whatever the hand does."""
-    wanted = [each.input for each in profile.axis]
-    there = device.info.axes
-    if there and wanted and not set(wanted) & set(there):
-        raise NotAvailable(
-            f"{device.info.title} has none of the inputs of profile {profile.name!r}, "
-            f"{', '.join(wanted)}; it has {', '.join(there)}. Choose another device or profile"
-        )
