@@ -93,7 +93,7 @@ def test_a_hang_is_named_and_everything_else_goes_on(hang, caplog, calls):
         wait_until(lambda: Channel(0, 0) in {each[1] for each in controller.of("stop")})
         wait_until(lambda: not manager.devices[0].stall)
         wait_until(lambda: not rig["d0.c0"].details.in_motion)
-        assert not rig["d0.c1"].details.error
+        wait_until(lambda: not rig["d0.c1"].details.error)
         assert rig["d0.c1"].move_to(2.0) == 2.0
         assert "returned, and goes on" in caplog.text
 
