@@ -440,6 +440,16 @@ class HandlingContext:
         """Return the next image to be exposed; to be yielded."""
         return LiveImage(self.vico.camera(self.settings.camera), self.clock, self.shared.seen)
 
+    def check_camera(self) -> None:
+        """Raise `NotAvailable` where the camera has been lost for so long that it is given up.
+
+        Asked where no image is needed for long: how long it is lost counts from the first asking.
+        """
+        camera = self.vico.camera(self.settings.camera)
+        problem = camera.problem
+        if self.shared.seen.stays_lost(problem):
+            raise NotAvailable(f"no image of {camera.name}: {problem}")
+
     def mapped(self, image: CameraImage, height_um: float = 0.0) -> PixelMap:
         """Return the map of an image for things at a height above the plate."""
         plate_um = self.vision.settings.plate_um

@@ -518,9 +518,17 @@ class PushSpans(FibreOperation):
     """All spans of one grasp, the longest first; each one makes the plan of the next better.
 
     Of a fibre that has a result already the spans of that are kept until there are all of the next.
+
+    Parameters
+    ----------
+    seen_after : bool
+        The fibre is to be seen afterwards: where the camera stays lost no further span is pushed.
     """
 
     name = "push the spans"
+
+    def __init__(self, *, seen_after: bool = True) -> None:
+        self._seen_after = seen_after
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
@@ -557,14 +565,15 @@ class PushSpans(FibreOperation):
         if work.shared.parks_limit and not work.beside_another:
             yield from retract_probe(work)
 
-    @staticmethod
-    def _spans(work: HandlingContext, fibre: HeldFibre) -> Steps:
+    def _spans(self, work: HandlingContext, fibre: HeldFibre) -> Steps:
         limits, fit = span_limits(work), fit_settings(work, fibre)
         while True:
             guess = fibre.ei_guess_n_m2 or DRY_EI_N_M2
             plan = plan_spans(fibre.free_um, guess, limits, done=fibre.spans, settings=fit)
             if not plan:
                 break
+            if self._seen_after:
+                work.check_camera()
             yield from OneSpan(work, fibre, plan[0]).steps()
             if len(fibre.spans) <= GUESSED_FROM:
                 guessed = guess_ei(fibre.spans, settings=fit)

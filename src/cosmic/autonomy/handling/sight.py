@@ -247,7 +247,7 @@ def map_at(
 
 RESTARTS: Final = 5
 AFTER_FAILURE: Final = 1
-"""Restarts of a camera that was given up at the look before."""
+"""Restarts of a camera that was given up at the look before, or has long been lost."""
 GIVE_UP_WALL_S: Final = 10.0
 """How long a camera that says why there is no image is started again."""
 LOST_WALL_S: Final = 1.0
@@ -265,10 +265,26 @@ class LastSeen:
     ----------
     given_up : bool
         None was to be had at the last look.
+    lost_since_wall_s : float or None
+        When the camera was first seen to say why there are no images; None: it does not.
     """
 
     image: CameraImage | None = None
     given_up: bool = False
+    lost_since_wall_s: float | None = None
+
+    def stays_lost(self, problem: str) -> bool:
+        """Return whether the camera has long said why there is no image; `problem` is that now.
+
+        It counts whether an image is wanted meanwhile or not: it is looked for all the time.
+        """
+        now_wall_s = WALL.now_s()
+        if not problem:
+            self.lost_since_wall_s = None
+        elif self.lost_since_wall_s is None:
+            self.lost_since_wall_s = now_wall_s
+        since_wall_s = self.lost_since_wall_s
+        return since_wall_s is not None and now_wall_s - since_wall_s > GIVE_UP_WALL_S
 
     def shows_the_same(self, image: CameraImage) -> bool:
         """Return whether a later image is the same to the last bit, which noise never allows."""
@@ -330,7 +346,7 @@ class LiveImage:
             return
         if not self._last.shows_the_same(image):
             self._last.image = self._image = image
-            self._last.given_up = False
+            self._last.given_up, self._last.lost_since_wall_s = False, None
             return
         self._begin_anew(
             NotAvailable(
@@ -340,8 +356,10 @@ class LiveImage:
         )
 
     def _begin_anew(self, trouble: CosmicError) -> None:
-        lost = bool(self._camera.problem) and WALL.now_s() > self._give_up_wall_s
-        if lost or self._restarts >= self._most:
+        problem = self._camera.problem
+        late = bool(problem) and WALL.now_s() > self._give_up_wall_s
+        lost = self._last.stays_lost(problem) and self._restarts >= AFTER_FAILURE
+        if late or lost or self._restarts >= self._most:
             self._error, self._last.given_up = trouble, True
             return
         self._restarts += 1

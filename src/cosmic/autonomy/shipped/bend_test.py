@@ -96,9 +96,13 @@ def one_fibre(settings: HandlingSettings, treated: Part[HandlingContext]) -> Par
     )
 
 
-def measured(pushes: int = PUSHES) -> Part[HandlingContext]:
-    """Return the measurement of a fibre that is held before the probe."""
-    pushed = Retry(PushSpans(), pushes, only={NO_CONTACT}, between=StepBack())
+def measured(pushes: int = PUSHES, *, seen_after: bool = True) -> Part[HandlingContext]:
+    """Return the measurement of a fibre that is held before the probe.
+
+    Where it is to be seen afterwards, it is given up when the camera stays lost meanwhile.
+    """
+    push = PushSpans(seen_after=seen_after)
+    pushed = Retry(push, pushes, only={NO_CONTACT}, between=StepBack())
     return Retry(
         Sequence("measure", pushed, FitSpans()),
         MEASUREMENTS,

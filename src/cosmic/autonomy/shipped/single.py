@@ -48,7 +48,7 @@ def build_push(push: PushToForce) -> Procedure[HandlingContext]:
 
 def build_measure() -> Procedure[HandlingContext]:
     """Return what measures the bending stiffness of the held fibre."""
-    return _procedure("measure", Held(), AtProbe(), measured(), StandOff())
+    return _procedure("measure", Held(), AtProbe(), measured(seen_after=False), StandOff())
 
 
 def build_put_away() -> Procedure[HandlingContext]:

@@ -151,6 +151,35 @@ def test_a_camera_that_was_unplugged_is_given_up_soon_and_at_once_the_next_time(
     assert not last.given_up
 
 
+def test_one_that_is_known_to_be_lost_for_long_is_given_up_as_soon_as_an_image_is_wanted(
+    camera: FakeCamera, clock: ManualClock, monkeypatch: pytest.MonkeyPatch
+):
+    wall = ManualClock(auto_advance=True)
+    monkeypatch.setattr(sight, "WALL", wall)
+    last, camera.unplugged = LastSeen(), True
+    assert not last.stays_lost(camera.problem)
+    wall.advance(sight.GIVE_UP_WALL_S + 1.0)
+    began_s = wall.now_s()
+    with pytest.raises(NotAvailable, match=r"no image of microscope: it was unplugged"):
+        wanted(camera, clock, last).wait(20.0)
+    assert camera.commands == ["stop", "start"] * AFTER_FAILURE
+    assert wall.now_s() - began_s < 0.3 * sight.GIVE_UP_WALL_S
+
+
+def test_one_that_came_back_meanwhile_counts_as_lost_anew(
+    camera: FakeCamera, clock: ManualClock, monkeypatch: pytest.MonkeyPatch
+):
+    wall = ManualClock(auto_advance=True)
+    monkeypatch.setattr(sight, "WALL", wall)
+    last, camera.unplugged = LastSeen(), True
+    assert not last.stays_lost(camera.problem)
+    wall.advance(sight.GIVE_UP_WALL_S + 1.0)
+    camera.unplugged = False
+    wanted(camera, clock, last).wait(5.0)
+    camera.unplugged = True
+    assert not last.stays_lost(camera.problem)
+
+
 def test_images_without_any_light_are_not_taken_for_a_frozen_camera(
     camera: FakeCamera, clock: ManualClock
 ):

@@ -9,7 +9,7 @@ import pytest
 from typing_extensions import override
 
 from cosmic.autonomy.bending.fit import fit_bending
-from cosmic.autonomy.handling import push
+from cosmic.autonomy.handling import push, sight
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.held_fibre import HeldFibre
@@ -25,7 +25,7 @@ from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps
 from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.clock import ManualClock
-from cosmic.frame.errors import MoveCancelled
+from cosmic.frame.errors import MoveCancelled, NotAvailable
 from cosmic.vico.core.tool_settings import ToolSettings
 
 GRIPPER = ToolSettings(
@@ -160,6 +160,7 @@ class Bench(HandlingContext):
         self.reach_um, self.lost = math.inf, False
         self.listeners, self.felt_un, self.frequency_hz = list[Any](), ZERO_UN, 0.0
         self.peak_un, self.random = 0.0, np.random.default_rng(3)
+        self.microscope = SimpleNamespace(name="microscope", problem="")
         line = np.column_stack([np.linspace(0.0, length_um, 61), np.zeros(61)])
         reach = Reach(Candidate(line, length_um, WIDTH_UM, 0.0, 60.0), 0.0, line, (250.0, 0.0))
         self.free_um = length_um - 250.0
@@ -167,6 +168,9 @@ class Bench(HandlingContext):
 
     def __getitem__(self, name: str) -> Axis:
         return Axis(self, name)
+
+    def camera(self, _name: str) -> SimpleNamespace:
+        return self.microscope
 
     @override
     def tool(self, name: str) -> ToolSettings:
@@ -295,6 +299,55 @@ def test_the_standard_is_round_and_is_not_slid():
     bench.held_fibre().standard = True
     carried_out(PushSpans().run(bench))
     assert bench.heights_um == []
+
+
+def push_without_camera(
+    bench: Bench, operation: PushSpans, wall: ManualClock, *, back_after: int = 0
+) -> None:
+    """Push while the camera is lost, and time passes between the spans."""
+    spans = bench.held_fibre().spans
+    bench.microscope.problem = "it was unplugged"
+    before, steps = len(spans), operation.run(bench)
+    result: object = None
+    while True:
+        try:
+            wish = steps.send(result)
+        except StopIteration:
+            return
+        if len(spans) > before:
+            before = len(spans)
+            wall.advance(0.6 * sight.GIVE_UP_WALL_S)
+            if before == back_after:
+                bench.microscope.problem = ""
+        result = wish.wait(0.0) if hasattr(wish, "wait") else None
+
+
+def test_a_fibre_is_not_pushed_on_where_the_camera_stays_lost(monkeypatch: pytest.MonkeyPatch):
+    wall = ManualClock()
+    monkeypatch.setattr(sight, "WALL", wall)
+    bench = Bench(5e-11)
+    with pytest.raises(NotAvailable, match="no image of microscope: it was unplugged"):
+        push_without_camera(bench, PushSpans(), wall)
+    assert len(bench.held_fibre().spans) == 2
+    assert bench.force_un() == 0.0, "the probe stands off the fibre"
+
+
+def test_a_camera_that_comes_back_ends_no_push(monkeypatch: pytest.MonkeyPatch):
+    wall = ManualClock()
+    monkeypatch.setattr(sight, "WALL", wall)
+    bench = Bench(5e-11)
+    push_without_camera(bench, PushSpans(), wall, back_after=1)
+    assert len(bench.held_fibre().spans) == 5
+
+
+def test_a_fibre_that_need_not_be_seen_afterwards_is_pushed_without_a_camera(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    wall = ManualClock()
+    monkeypatch.setattr(sight, "WALL", wall)
+    bench = Bench(5e-11)
+    push_without_camera(bench, PushSpans(seen_after=False), wall)
+    assert len(bench.held_fibre().spans) == 5
 
 
 def places_um(bench: Bench) -> list[float]:
