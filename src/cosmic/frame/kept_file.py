@@ -3,9 +3,10 @@
 import errno
 import math
 import os
+import re
 import stat
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Generator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
@@ -14,9 +15,20 @@ from typing import BinaryIO, Final
 import tomlkit
 from tomlkit.items import Item
 
+from cosmic.frame.clock import WALL
+from cosmic.frame.platform_services import lock_file, process_exists
+
 PART: Final = ".part"
 """How the name of a file ends while it is written."""
+LOCK: Final = ".lock"
+"""How the name of the file ends by which programs take turns in changing one."""
+WAIT_S: Final = 2.0
+"""How long another program is waited for that changes the same file."""
+LEFT_S: Final = 60.0
+"""A half written file that is older was left by a process that is gone: writing takes far less."""
+_LEFT: Final = re.compile(rf".+\.(\d+)-\d+{re.escape(PART)}")
 _numbers: Final = count(1)
+_cleared: Final[set[Path]] = set()
 
 
 def open_file(path: Path) -> BinaryIO:
@@ -37,7 +49,8 @@ def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file; the old one stays whole until the new one is on the disk.
 
     A link stays, and what it leads to is written. Who may read the file stays as it was. Of several
-    that write it at once, in this program or others, the last is kept as a whole.
+    that write it at once, in this program or others, the last is kept as a whole. At the first
+    file in a folder, what processes that were killed have left half written there is removed.
 
     Parameters
     ----------
@@ -53,6 +66,9 @@ def write_whole(path: Path, content: str | bytes) -> None:
     path = Path(os.path.realpath(path))
     part = path.with_name(f"{path.name}.{os.getpid()}-{next(_numbers)}{PART}")
     mode = _mode_of(path)
+    if path.parent not in _cleared:
+        _cleared.add(path.parent)
+        _remove_left(path.parent)
     text = isinstance(content, str)
     if isinstance(content, str):
         _check_encodable(content, path)
@@ -68,6 +84,34 @@ def write_whole(path: Path, content: str | bytes) -> None:
         with suppress(OSError):
             part.unlink(missing_ok=True)
         raise
+
+
+def _remove_left(folder: Path) -> None:
+    """Remove half written files of processes that are gone; never fails."""
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            name = _LEFT.fullmatch(entry.name)
+            if name is None or process_exists(int(name[1])):
+                continue
+            # One on another computer, whose numbers are not known here, is done in that time.
+            with suppress(OSError):
+                if datetime.now(UTC).timestamp() - entry.stat().st_mtime > LEFT_S:
+                    Path(entry).unlink()
+
+
+@contextmanager
+def changing(path: Path) -> Generator[None]:
+    """Be the only one who reads, changes and writes a file; other programs and threads wait.
+
+    One that takes too long, and a disk without locks, is not waited for: then the last one wins.
+    """
+    with ExitStack() as stack:
+        with suppress(OSError):  # where none can be made the file cannot be written either
+            lock = stack.enter_context(path.with_name(path.name + LOCK).open("ab"))
+            late_s = WALL.now_s() + WAIT_S
+            while not lock_file(lock.fileno(), alone=True) and WALL.now_s() < late_s:
+                WALL.sleep(0.01)
+        yield
 
 
 def _mode_of(path: Path) -> int | None:

@@ -1,6 +1,7 @@
 """Stations that answered are remembered, and found again by their name."""
 
 import logging
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -46,6 +47,13 @@ def test_what_the_user_wrote_into_the_file_stays() -> None:
     remember_stations([STATION])
     assert "# the microscope" in stations_file().read_text(encoding="utf-8")
     assert set(known_stations()) == {"fibervision", "fiberstation"}
+
+
+def test_several_that_are_remembered_at_once_are_all_kept() -> None:
+    stations = [StationAddress(f"station{n}", f"tcp/127.0.0.1:{7500 + n}") for n in range(8)]
+    with ThreadPoolExecutor(len(stations)) as pool:
+        list(pool.map(lambda each: remember_stations([each]), stations))
+    assert known_stations() == {each.name: each.endpoint for each in stations}
 
 
 def test_an_unknown_name_is_refused_with_those_that_are_known() -> None:

@@ -4,7 +4,9 @@ import errno
 import math
 import os
 import stat
+import subprocess
 import sys
+import time
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
@@ -15,7 +17,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosmic.frame.kept_file import toml_lines, write_whole
+from cosmic.frame import kept_file
+from cosmic.frame.kept_file import changing, toml_lines, write_whole
 
 
 @given(st.text(st.characters(codec="utf-8")))
@@ -86,6 +89,39 @@ def test_of_two_that_write_a_file_at_once_one_is_kept_as_a_whole(tmp_path: Path)
     assert seen <= set(texts)
     assert file.read_text(encoding="utf-8") in texts
     assert [each.name for each in tmp_path.iterdir()] == ["kept.toml"]
+
+
+def _ended_pid() -> int:
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    return ended.pid
+
+
+def test_what_a_killed_process_left_half_written_is_removed_at_the_next_start(
+    tmp_path: Path,
+) -> None:
+    gone, minutes_ago_s = _ended_pid(), time.time() - 300.0
+    left = tmp_path / f"kept.toml.{gone}-1.part"
+    ours = tmp_path / f"other.toml.{os.getpid()}-1.part"
+    users = tmp_path / "holiday.part"
+    fresh = tmp_path / f"kept.toml.{gone}-2.part"
+    for each in (left, ours, users, fresh):
+        each.write_text("half = ", encoding="utf-8")
+    for each in (left, ours, users):
+        os.utime(each, (minutes_ago_s, minutes_ago_s))
+    write_whole(tmp_path / "kept.toml", "new = 1\n")
+    names = {each.name for each in tmp_path.iterdir()}
+    assert names == {"kept.toml", ours.name, users.name, fresh.name}
+
+
+def test_one_that_changes_a_file_waits_for_another_but_not_for_ever(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "kept.toml"
+    monkeypatch.setattr(kept_file, "WAIT_S", 0.1)
+    with changing(file), changing(file):
+        write_whole(file, "new = 1\n")
+    assert file.read_text(encoding="utf-8") == "new = 1\n"
 
 
 def test_a_text_that_no_file_can_have_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:

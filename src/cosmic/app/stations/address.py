@@ -13,7 +13,7 @@ from PySide6.QtCore import QStandardPaths
 
 from cosmic.frame.config import StrictModel, load_model
 from cosmic.frame.errors import ConfigError
-from cosmic.frame.kept_file import write_whole
+from cosmic.frame.kept_file import changing, write_whole
 
 logger = logging.getLogger(__name__)
 
@@ -120,15 +120,15 @@ def known_stations() -> dict[str, str]:
 def remember_stations(addresses: Iterable[StationAddress]) -> None:
     """Keep stations that answered; where that is not possible a warning is logged."""
     path = stations_file()
+    fresh = {each.name: each.endpoint for each in addresses}
     try:
-        known = known_stations()
-        fresh = {each.name: each.endpoint for each in addresses}
-        if fresh.items() <= known.items():
+        if fresh.items() <= known_stations().items():
             return
         path.parent.mkdir(parents=True, exist_ok=True)
-        text = path.read_text(encoding="utf-8") if path.exists() else _HEAD
-        document = tomlkit.parse(text)  # which keeps the user's comments
-        document.setdefault("stations", tomlkit.table()).update(fresh)
-        write_whole(path, document.as_string())
+        with changing(path):
+            text = path.read_text(encoding="utf-8") if path.exists() else _HEAD
+            document = tomlkit.parse(text)  # which keeps the user's comments
+            document.setdefault("stations", tomlkit.table()).update(fresh)
+            write_whole(path, document.as_string())
     except (ConfigError, OSError) as exc:
         logger.warning("%s: the stations in use are not remembered: %s", path, exc)
