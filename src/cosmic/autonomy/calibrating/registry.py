@@ -4,7 +4,7 @@ import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
 from threading import Lock
@@ -77,6 +77,8 @@ def _write_file(path: Path, entries: Sequence[Mapping[str, object]]) -> None:
 FILE: Final = "calibrations.toml"
 LONGEST_S: Final = 7200.0
 """Age at which a calibration is stale where nobody says another."""
+CLOCKS_DIFFER: Final = timedelta(minutes=1)
+"""One that was made later than now, by more: the date was set back, and its age is unknown."""
 
 
 class CalibrationStanding(StrEnum):
@@ -249,6 +251,8 @@ class CalibrationRegistry:
         """Return whether it may be used."""
         if entry.problem or not entry.residual <= entry.largest:
             return CalibrationStanding.POOR
+        if entry.session != self.session and entry.made - self.now() > CLOCKS_DIFFER:
+            return CalibrationStanding.STALE
         if not self.age_s(entry) <= longest_s:
             return CalibrationStanding.STALE
         return (

@@ -619,6 +619,7 @@ class FrameCount:
     def __init__(self) -> None:
         self._next = 0
         self._last_us: int | None = None
+        self._last_wall_s = 0.0
 
     def pause(self) -> None:
         """Take the next gap for what it is: the camera was stopped on purpose."""
@@ -626,11 +627,15 @@ class FrameCount:
 
     def number(self, received_us: int, rate_hz: float) -> int:
         """Return the number of a frame; with a rate of 0 no gap is a loss."""
+        now_wall_s = WALL.now_s()
         if self._last_us is not None and rate_hz > 0.0:
-            periods = (received_us - self._last_us) * rate_hz / 1e6
+            gap_s, passed_s = (received_us - self._last_us) / 1e6, now_wall_s - self._last_wall_s
+            if abs(gap_s - passed_s) > _OLDEST_S:  # the date of the computer was set
+                gap_s = passed_s
+            periods = gap_s * rate_hz
             missing = round(periods) - 1 if periods > _LATE else 0
             self._next += missing
-        self._last_us = received_us
+        self._last_us, self._last_wall_s = received_us, now_wall_s
         self._next += 1
         return self._next - 1
 

@@ -70,6 +70,35 @@ def test_after_a_restart_it_is_there_but_is_to_be_looked_at_first(
     assert later.age_s(holds) == pytest.approx(280.0), "it was made when it was made"
 
 
+@pytest.mark.parametrize(
+    ("back", "standing"),
+    [
+        (timedelta(seconds=30), CalibrationStanding.UNCHECKED),
+        (timedelta(hours=2), CalibrationStanding.STALE),
+        (timedelta(days=4000), CalibrationStanding.STALE),
+    ],
+)
+def test_where_the_date_was_set_back_its_age_is_unknown_and_not_nothing(
+    registry: CalibrationRegistry, tmp_path: Path, back: timedelta, standing: CalibrationStanding
+) -> None:
+    registry.put(entry(registry))
+    later = CalibrationRegistry(tmp_path / "kept", "1.2", ManualClock(), lambda: NOON - back)
+    found = later.get("height", "left")
+    assert found is not None
+    assert later.standing(found) is standing
+
+
+def test_a_date_set_back_while_the_program_runs_changes_nothing(
+    tmp_path: Path, clock: ManualClock
+) -> None:
+    dates = iter([NOON, NOON - timedelta(hours=5)])
+    registry = CalibrationRegistry(tmp_path / "kept", "1.2", clock, lambda: next(dates))
+    registry.put(entry(registry))
+    found = registry.get("height", "left")
+    assert found is not None
+    assert registry.standing(found) is CalibrationStanding.FRESH
+
+
 def test_a_poor_one_is_listed_with_its_reason_and_never_in_force(
     registry: CalibrationRegistry,
 ) -> None:
@@ -107,7 +136,7 @@ def test_what_others_do_to_the_file_meanwhile_stays(
 ) -> None:
     registry.put(entry(registry, "first"))
     registry.put(entry(registry, "second"))
-    other = CalibrationRegistry(tmp_path / "kept")
+    other = CalibrationRegistry(tmp_path / "kept", now=lambda: NOON)
     other.put(entry(other, "third"))
     other.forget("first", "left")
     registry.put(entry(registry, "fourth"))

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from contract.cameras.dc1394 import FIXED, SCALABLE, FakeDc1394, ScalableRig
-from cosmic.frame.clock import WALL
+from cosmic.frame.clock import WALL, ManualClock
 from cosmic.frame.errors import ConfigError, DeviceError, DeviceFault, NotConnectedError
+from cosmic.vico.hw import dc1394
 from cosmic.vico.hw import dc1394_ctypes as dc
 from cosmic.vico.hw.dc1394 import Dc1394Library, FrameCount
 from cosmic.vico.hw.dc1394_ctypes import Dc1394Calls
@@ -186,6 +187,19 @@ def test_frames_in_time_are_not_lost_and_late_ones_are_counted_by_periods() -> N
     count = FrameCount()
     numbers = [count.number(us, 60.0) for us in (0, 16_667, 40_000, 50_000, 100_000)]
     assert numbers == [0, 1, 2, 3, 6]
+
+
+@pytest.mark.parametrize("set_h", [3, -3])
+def test_a_date_that_is_set_meanwhile_loses_no_frame(
+    set_h: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wall, period_us, set_us = ManualClock(), 16_667, set_h * 3_600_000_000
+    monkeypatch.setattr(dc1394, "WALL", wall)
+    count, numbers = FrameCount(), list[int]()
+    for number in range(6):
+        numbers.append(count.number(number * period_us + (set_us if number > 2 else 0), 60.0))
+        wall.advance(period_us / 1e6)
+    assert numbers == list(range(6))
 
 
 def test_a_trigger_may_come_whenever_it_likes() -> None:
