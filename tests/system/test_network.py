@@ -432,6 +432,25 @@ def test_with_certificates_only_those_who_prove_their_name_are_let_in(
         assert [each.split("/")[0] for each in _clients(station)] == ["vision"]
 
 
+def test_where_the_date_is_beyond_the_certificates_both_ends_say_so(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    # Valid until now, as where a computer's date is set years ahead.
+    ended = make_certificates(tmp_path, "fibres", "vision", valid_days=0)
+    endpoint = f"tls/127.0.0.1:{free_port()}"
+    station = Station("fibres", FailurePolicy())
+    why = "is valid from .* check the date of this computer, or make new certificates"
+    with ExitStack() as stack:
+        line = Line(endpoint, True, "fibres", ended["fibres"], ("vision",))
+        stack.enter_context(listening(station, line))
+        client = connected(endpoint, timeout_s=0.0, certificates=ended["vision"])
+        vision = stack.enter_context(client)
+        assert wait_until(lambda: "valid from" in vision.state.why, 10.0), vision.state
+        with pytest.raises(StationAway, match=why):
+            vision.call("stage", "add", {"a": 1.0})
+    assert any("nobody is let in" in each.getMessage() for each in caplog.records)
+
+
 def _clients(station: Station) -> list[str]:
     found: list[str] = []
     station.presence(lambda presence: found.append(presence.name))()

@@ -178,6 +178,22 @@ def name_in(files: Certificates) -> str:
         raise ConfigError(f"{files.certificate}: the name in it cannot be read: {exc}") from exc
 
 
+def out_of_date(files: Certificates) -> str:
+    """Return why a certificate is not accepted today, in words; empty: it is, or cannot be read."""
+    try:
+        certificate = x509.load_pem_x509_certificate(files.certificate.read_bytes())
+    except (OSError, ValueError):
+        return ""
+    first, last = certificate.not_valid_before_utc, certificate.not_valid_after_utc
+    today = datetime.now(UTC)
+    if first <= today <= last:
+        return ""
+    return (
+        f"{files.certificate} is valid from {first:%Y-%m-%d} to {last:%Y-%m-%d}, and it is "
+        f"{today:%Y-%m-%d} here: check the date of this computer, or make new certificates"
+    )
+
+
 def _name(text: str) -> x509.Name:
     return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, text)])
 

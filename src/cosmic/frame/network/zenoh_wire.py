@@ -51,6 +51,8 @@ class ZenohWire(Wire):
         except zenoh.ZError as exc:
             raise StationAway(f"the line cannot be opened: {exc}") from exc
         self._line = line
+        if line.listens and (problem := self._out_of_date()):
+            logger.warning("%s: nobody is let in: %s", line.station, problem)
         self._lock = Lock()
         self._inboxes: weakref.WeakSet[_Channel[Any]] = weakref.WeakSet()
         self._closed = False
@@ -60,6 +62,15 @@ class ZenohWire(Wire):
     def line(self) -> Line:
         """Where it goes; direct lines go there as well."""
         return self._line
+
+    def _out_of_date(self) -> str:
+        """Return why the certificate of this end is not accepted today; empty: it is."""
+        if self._line.certificates is None:
+            return ""
+        # Imported here: it loads a library of cryptography.
+        from cosmic.frame.network.certificates import out_of_date
+
+        return out_of_date(self._line.certificates)
 
     @override
     def ask(self, key: str, message: bytes, *, timeout_s: float) -> bytes:
@@ -77,7 +88,8 @@ class ZenohWire(Wire):
         except zenoh.ZError as exc:
             raise StationAway(f"the line is closed: {exc}") from exc
         if reply is None:
-            raise StationAway("no answer: the station is not running or not reachable")
+            reason = self._out_of_date() or "the station is not running or not reachable"
+            raise StationAway(f"no answer: {reason}")
         if reply.ok is None:
             raise StationTimeout(f"no answer came within {timeout_s:g} s")
         return bytes(reply.ok.payload.to_bytes())
