@@ -142,6 +142,8 @@ class MotionLog:
         self._keep(state.name, self._clock.now_s(), state.position)
 
     def _feel(self, chunk: DataChunk) -> None:
+        if self._channel not in chunk.channels:
+            return  # renamed, or switched off: whoever needs the force says so
         values = chunk.values[chunk.channels.index(self._channel)]
         self._keep(self._channel, chunk.end_time_s, float(values.mean()))
 
