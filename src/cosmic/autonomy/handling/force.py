@@ -71,9 +71,14 @@ class ForceWatch:
         return self._daqco.running
 
     @property
+    def gone(self) -> bool:
+        """Samples are being acquired, and none of the force is among them."""
+        return self._daqco.running and self._channel not in self._daqco.channels
+
+    @property
     def problem(self) -> str:
         """Why no samples come, as far as acquisition knows."""
-        if self._daqco.running and self._channel not in self._daqco.channels:
+        if self.gone:
             return f"there is no channel {self._channel} any more: renamed, or switched off"
         return self._daqco.problem or "acquisition gives no reason"
 
@@ -177,9 +182,9 @@ class ForceWanted:
         return self._ended()
 
     def _ended(self) -> bool:
-        """Return whether acquisition ran when this was wanted, and has ended since."""
+        """Return whether acquisition ran when this was wanted, and no force comes any more."""
         self._ran = self._ran or self._watch.running
-        return self._ran and not self._watch.running
+        return (self._ran and not self._watch.running) or self._watch.gone
 
     def add_callback(self, callback: Callable[["ForceWanted"], object]) -> None:
         """Call `callback(self)` at the end, in the thread of the acquisition."""

@@ -84,6 +84,18 @@ def test_a_wait_ends_when_no_samples_come(
         watch.wanted(0.05).wait(1.0)
 
 
+def test_a_wait_ends_at_once_where_the_channel_was_renamed(
+    watched: tuple[Daqco, ManualClock, ForceWatch], monkeypatch: pytest.MonkeyPatch
+):
+    daqco, _, watch = watched
+    wanted = watch.wanted(0.05)
+    assert not wanted.done
+    monkeypatch.setattr(daqco, "channels", ("aux", "strain"))
+    assert wanted.done
+    with pytest.raises(NotAvailable, match="no channel force any more: renamed"):
+        wanted.wait(1.0)
+
+
 def test_the_peak_counts_either_sign_and_begins_anew_when_it_was_taken(
     watched: tuple[Daqco, ManualClock, ForceWatch],
 ):
