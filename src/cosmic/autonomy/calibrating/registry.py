@@ -18,7 +18,7 @@ from cosmic.frame.clock import Clock
 from cosmic.frame.config import StrictModel, load_model
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.events import Event, Unsubscribe
-from cosmic.frame.kept_file import toml_lines, write_whole
+from cosmic.frame.kept_file import changing, toml_lines, write_whole
 
 logger = logging.getLogger(__name__)
 
@@ -275,7 +275,7 @@ class CalibrationRegistry:
     def _write(self, changed: tuple[str, str]) -> None:
         """Write what became of one; what others did to the file meanwhile stays."""
         if self.folder is not None:
-            with self._writing:
+            with self._writing, changing(self.folder / FILE):
                 if (self.folder / FILE).exists():
                     self._take_over(self._in_file(), changed)
                 names = CalibrationEntry.__slots__

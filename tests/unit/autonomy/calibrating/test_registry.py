@@ -1,6 +1,7 @@
 """What the calibration registry keeps, and whether it lets one be used."""
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -149,6 +150,18 @@ def test_what_others_do_to_the_file_meanwhile_stays(
     other.put(entry(other, "second", residual=3.0))
     registry.put(entry(registry, "second", residual=1.0))
     assert {each.name: each.residual for each in registry.entries}["second"] == 1.0
+
+
+def test_two_programs_that_write_at_once_lose_nothing_of_each_other(tmp_path: Path) -> None:
+    registries = [CalibrationRegistry(tmp_path, now=lambda: NOON) for _ in range(2)]
+
+    def put(number: int) -> None:
+        for each in range(8):
+            registries[number].put(entry(registries[number], f"height {number}.{each}"))
+
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(put, range(2)))
+    assert len(CalibrationRegistry(tmp_path).entries) == 16
 
 
 def test_a_file_that_became_wrong_meanwhile_stays_and_is_named(
