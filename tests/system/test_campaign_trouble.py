@@ -231,16 +231,20 @@ def test_what_cannot_be_written_in_the_journal_is_not_done(
     campaign = bench.campaign(procedure="transport")
     note = CampaignStore.note
 
+    def full(*_args: object, **_more: object) -> None:
+        raise CampaignError("campaign.sqlite cannot be written: disk is full; make room")
+
     def full_at_the_carrying(store: CampaignStore, operation: str, *args, **more) -> None:
         if operation == "carry to the probe":
-            raise CampaignError("campaign.sqlite cannot be written: disk is full; make room")
+            full()
         note(store, operation, *args, **more)
 
     with monkeypatch.context() as patch:
         patch.setattr(CampaignStore, "note", full_at_the_carrying)
+        patch.setattr(CampaignStore, "end", full)
         campaign.run_here()
     assert campaign.phase is CampaignPhase.FAILED
-    assert "disk is full; make room" in campaign.end_reason
+    assert campaign.end_reason.count("disk is full; make room") == 1
     bench.check_stands()
     assert not bench.truth.of("released") + bench.truth.of("dropped")
     again = bench.campaign(procedure="transport")

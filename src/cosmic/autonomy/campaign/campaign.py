@@ -362,7 +362,9 @@ class Campaign:
             self._analyse()
             kept = True
         except CosmicError as exc:
-            failed, kept, self._end_reason = True, True, f"{self._end_reason}; {exc}"
+            failed = kept = True
+            if str(exc) not in self._end_reason:  # a disk that is full says it each time
+                self._end_reason = f"{self._end_reason}; {exc}"
         finally:
             self.store.close()
             if not kept:
