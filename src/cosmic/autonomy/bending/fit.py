@@ -9,6 +9,8 @@ import numpy as np
 
 from cosmic.autonomy.bending.budget import budget_of
 from cosmic.autonomy.bending.checks import checked
+from cosmic.autonomy.bending.curved import NaturalShape
+from cosmic.autonomy.bending.holds import UNKNOWN_HOLDS, Holds, holds_of
 from cosmic.autonomy.bending.inference import (
     DRIFT,
     FRICTION,
@@ -95,6 +97,8 @@ class MeasuredFibre:
         Of the campaign that was over, 0 to 1.
     certificate : Certificate or None
         Of a standard.
+    holds : Holds
+        How far sections of the campaign are held, as far as it is known.
     """
 
     spans: tuple[SpanFit, ...]
@@ -104,6 +108,7 @@ class MeasuredFibre:
     settings: FitSettings
     part: float = 0.0
     certificate: Certificate | None = None
+    holds: Holds = UNKNOWN_HOLDS
 
     def at(self, part: float) -> "MeasuredFibre":
         """Return the same, measured when another part of the campaign was over."""
@@ -112,6 +117,12 @@ class MeasuredFibre:
         column = self.readings.to_common.copy()
         column[:, DRIFT] = part
         return replace(self, part=part, readings=replace(self.readings, to_common=column))
+
+    def held(self, holds: Holds) -> "MeasuredFibre":
+        """Return the same, where sections of the campaign are held so far."""
+        if self.readings is None or self.certificate is not None or holds == self.holds:
+            return replace(self, holds=holds)
+        return _read(replace(self, holds=holds), self.readings.response)
 
     def about(self, friction: float) -> "MeasuredFibre":
         """Return the same, fitted about another friction."""
@@ -122,7 +133,7 @@ class MeasuredFibre:
             certificate=self.certificate,
             friction=friction,
             known=self.readings.response if self.readings is not None else None,
-        )
+        ).held(self.holds)
 
 
 def measure_fibre(
@@ -155,33 +166,47 @@ def measure_fibre(
     positions = positions_um(spans)
     fits = fit_spans(spans, settings=settings, places_um=positions, friction=friction)
     used = usable(fits)
-    shapes = [spans[n].shape or straight(positions[n]) for n in used]
+    measured = MeasuredFibre(fits, used, None, tuple(spans), settings, part, certificate)
+    shapes = _shapes(measured)
     if not shapes:
-        return MeasuredFibre(fits, (), None, tuple(spans), settings, part, certificate)
-    if known is None or known.shapes != tuple(shapes):
+        return measured
+    if known is None or known.shapes != shapes:
         known = response_of(shapes, depth_um=settings.offset_um)
+    return _read(measured, known)
+
+
+def _shapes(fibre: MeasuredFibre) -> tuple[NaturalShape, ...]:
+    """Return the shapes of the spans to stand on."""
+    positions = positions_um(fibre.raw)
+    return tuple(fibre.raw[n].shape or straight(positions[n]) for n in fibre.used)
+
+
+def _read(fibre: MeasuredFibre, response: Response) -> MeasuredFibre:
+    """Return the same with the readings of its spans."""
+    settings, fits = fibre.settings, [fibre.spans[n] for n in fibre.used]
     certified = None
-    if certificate is not None:
-        log_ei = math.log(certificate.ei_n_m2 * UN_UM2_PER_N_M2)
-        certified = log_ei, certificate.expanded_part / 2.0
-    seen = all(spans[n].shape is not None for n in used)
+    if fibre.certificate is not None:
+        log_ei = math.log(fibre.certificate.ei_n_m2 * UN_UM2_PER_N_M2)
+        certified = log_ei, fibre.certificate.expanded_part / 2.0
+    seen = all(fibre.raw[n].shape is not None for n in fibre.used)
     direction = direction_by_touch(
-        shapes if seen else [],
-        np.array([fits[n].hinge_um for n in used]),
+        response.shapes if seen else (),
+        np.array([each.hinge_um for each in fits]),
         radius_um=settings.radius_um,
         noise_um=settings.touch_std_um,
         prior_rad=math.radians(settings.direction_std_deg),
     )
     readings = readings_of(
-        [fits[n] for n in used],
-        known,
+        fits,
+        response,
         settings,
-        part=part,
+        part=fibre.part,
         certified=certified,
         direction=direction,
-        slipped=any(Quality.SLIPPED in each.flags for each in fits),
+        slipped=any(Quality.SLIPPED in each.flags for each in fibre.spans),
+        holds=fibre.holds,
     )
-    return MeasuredFibre(fits, used, readings, tuple(spans), settings, part, certificate)
+    return replace(fibre, readings=readings)
 
 
 def usable(fits: Sequence[SpanFit]) -> tuple[int, ...]:
@@ -276,6 +301,8 @@ def assess_campaign(
         for each, result, reading in zip(standards, alone, found.readings, strict=True)
     )
     settings = found.settings
+    holds = holds_of([[each.spans[n] for n in each.used] for each in fibres])
+    fibres = [each.held(holds) for each in fibres]
     every = _unsure([*fibres, *(standards[n] for n in found.used)], found.jump_part)
     verified = bool(found.used)
     assessed = _assessed(every, settings)

@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.special import chdtrc, ndtr
 
+from cosmic.autonomy.bending.holds import TWISTED, UNKNOWN_HOLDS, Holds
 from cosmic.autonomy.bending.response import LaidOut, Response
 from cosmic.autonomy.bending.result import COMMON_SOURCES, Floats, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
@@ -39,12 +40,6 @@ WEIGHED: Final = 1e-4
 """Depths and variations that weigh less than this do not count for what a fit leaves."""
 
 UNLIKELY: Final = 1e-3
-TWISTED: Final = 0.25
-"""Of what friction does to a section askew: the part that differs between spans, by twist; it may
-be seen to differ by more."""
-
-TWISTED_LEAST: Final = 0.015
-
 TURNED_PART: Final = 1.0
 TURNED_LEAST: Final = 0.01
 """How far friction that holds a section askew may have turned round on the way back, as a part of
@@ -172,6 +167,7 @@ def readings_of(
     certified: tuple[float, float] | None = None,
     direction: tuple[float, float] | None = None,
     slipped: bool = False,
+    holds: Holds = UNKNOWN_HOLDS,
 ) -> Readings:
     """Return the readings of the spans of one fibre.
 
@@ -186,6 +182,8 @@ def readings_of(
         standard deviation of that, rad; by the settings if None.
     slipped : bool
         See `Readings`.
+    holds : Holds
+        How far sections of the campaign are held.
     """
     rows = _rows(fits)
     span = np.array([each.span for each in rows])
@@ -201,7 +199,7 @@ def readings_of(
         to_common[:, [FRICTION, SHEAR]] = 0.0
     same = span[:, None] == span[None, :]
     own = (*_own(response, span, settings, direction), shear)
-    freed = None if glass else _freed(fits, rows)
+    freed = None if glass else _freed(fits, rows, holds)
     if glass:
         own = (*own[1:], ("friction", "", friction, 0.0, settings.friction_std))
     if freed is not None:
@@ -270,12 +268,15 @@ def _askew(sign: Floats, same: np.ndarray, settings: FitSettings) -> Floats:
     return np.asarray(each * np.outer(sign, sign))
 
 
-def _freed(fits: Sequence[SpanFit], rows: Sequence["_Row"]) -> tuple[Floats, Floats] | None:
+def _freed(
+    fits: Sequence[SpanFit], rows: Sequence["_Row"], holds: Holds
+) -> tuple[Floats, Floats] | None:
     """Return what is to be added to ln(k), and its covariance; None: friction never let go.
 
     On the way out a section askew was as much too stiff as the force fell once friction let go, and
-    as in the other spans, but for twist: each counts by how well it is known. On the way back it
-    may have turned round, by any part of that: how far depends on the section.
+    as in the other spans, but for twist, and as in the other fibres as far as those are alike: each
+    counts by how well it is known. On the way back it may have turned round, by any part of that:
+    how far depends on the section.
     """
     logs = np.array([each.freed_log for each in fits])
     stds = np.array([each.freed_std_part for each in fits])
@@ -283,11 +284,12 @@ def _freed(fits: Sequence[SpanFit], rows: Sequence["_Row"]) -> tuple[Floats, Flo
     if not known.any():
         return None
     weights = 1.0 / np.maximum(stds[known], LEAST_STD) ** 2
-    mean = float(weights @ logs[known] / weights.sum())
+    precision = float(weights.sum()) + holds.std**-2.0
+    mean = (float(weights @ logs[known]) + holds.mean * holds.std**-2.0) / precision
     seen = _between(logs[known], weights)
-    twisted = math.hypot(TWISTED * mean, TWISTED_LEAST, seen)
+    twisted = math.hypot(TWISTED * mean, holds.twisted, seen)
     # A slide of a short span tells little: it is taken together with what the others show.
-    by_others = math.hypot(twisted, float(weights.sum() ** -0.5))
+    by_others = math.hypot(twisted, precision**-0.5)
     own = np.where(known, by_others**2 / (by_others**2 + np.where(known, stds, 0.0) ** 2), 0.0)
     logs = mean + own * np.where(known, logs - mean, 0.0)
     stds = by_others * np.sqrt(1.0 - own)

@@ -43,6 +43,9 @@ ROUNDS: Final = 3
 PRIOR_FIBRES: Final = 3.0
 """So many fibres weigh as much as what is known of the variation beforehand."""
 
+MOST_TAUGHT: Final = 60
+"""So many fibres teach at most, of all together: what drifts errs alike in those of a day."""
+
 LEAST_PROBABILITY: Final = 1e-3
 """Fibres that the model fits worse teach nothing."""
 
@@ -146,6 +149,7 @@ def _prior_weights(
         if read.certified is None and fits and len(readings) > 1:
             likely = np.exp(each.log_likelihood - each.log_likelihood.max()) @ spreads
             logs[number] = np.log(of_depth @ likely + 1e-300)
+    logs = logs * _counts(int(np.count_nonzero(logs.any(axis=1))))
     total = logs.sum(axis=0) + np.log(prior)
     found = []
     for number, read in enumerate(readings):
@@ -156,6 +160,11 @@ def _prior_weights(
         depths = (weight / weight.sum()) @ of_depth
         found.append(depths[:, None] * spreads[None, :])
     return found
+
+
+def _counts(fibres: int) -> float:
+    """Return as how much of a fibre each of so many counts."""
+    return min(1.0, MOST_TAUGHT / max(fibres, 1))
 
 
 def _variations(assessed: Sequence[Assessed], readings: Sequence[Readings]) -> Floats:
@@ -178,9 +187,13 @@ def _shared(
     precision = np.linalg.inv(prior.covariance)
     total, pulled = precision, precision @ prior.mean
     of_each = [(np.zeros_like(total), np.zeros_like(pulled))] * len(readings)
-    for numbers, std in _with_one_error(readings, assessed):
+    groups = _with_one_error(readings, assessed)
+    fibres = _counts(sum(math.isinf(std) for _, std in groups))
+    for numbers, std in groups:
         said = [_Said.of(readings[n], assessed[n], weights[n], settings) for n in numbers]
         own, pull = reduce(add, said).with_unknown(std)
+        if math.isinf(std):
+            own, pull = own * fibres, pull * fibres
         total, pulled = total + own, pulled + pull
         for at, number in enumerate(numbers):
             of_each[number] = own, pull

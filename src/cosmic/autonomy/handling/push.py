@@ -173,6 +173,7 @@ class OneSpan:
         self._freed: Freed | None = None
         self._shape = shape_of(work, fibre)
         self._slope = self._shape.slope_at(plan.span_um)
+        self._first = fibre.zero_un is None
         # The probe pushes along its own direction; way grows as it does.
         self._sign = 1.0 if work.probe.forward[1] > 0.0 else -1.0
 
@@ -188,6 +189,8 @@ class OneSpan:
             yield from self._go_in_front()
             base = yield from self._baseline()
             contact = yield from self._search(base)
+            if self._first and self._push.rest_s > 0.0:
+                base = yield from self._rest(contact)
             yield from self._slide(base, contact)
             yield from self._out(base, contact)
             self._place_contact(contact)
@@ -253,8 +256,7 @@ class OneSpan:
         _, y = work.tip_now(self._probe)
         if self._to_probe(y) > aside:
             yield self._to_travel(aside)
-        first = self._fibre.zero_un is None
-        if first:
+        if self._first:
             self._fibre.zero_un = yield from self._mean_un(push.average_s)
         yield work.go({self._probe.x_axis: x - self._probe.tip_um[0]})
         if self._fibre.tilts:
@@ -264,8 +266,6 @@ class OneSpan:
         # Only where the fibre was met before is it known well enough to come nearer at once.
         known = bool(self._fibre.contacts)
         yield from self._come_to(surface - push.near_um - SURE_TIMES * std if known else aside)
-        if first and push.rest_s > 0.0:
-            yield push.rest_s  # stages that came from far creep on after their sensors stand
 
     def _come_to(self, probe_um: float) -> Steps:
         """Go there, and back again as long as something is felt that should not be there.
@@ -339,6 +339,21 @@ class OneSpan:
             f"the probe met nothing {push.search_um:g} um beyond where fibre "
             f"{self._fibre.number} should be, {self._plan.span_um:.0f} um from the jaws",
         )
+
+    def _rest(self, free_um: float) -> Generator[Yielded, object, float]:
+        """Wait beside the fibre, and begin anew: stages creep on after a long way.
+
+        They did so while the fibre was looked for; what was read meanwhile does not count.
+        """
+        push, began_s = self._push, self._points.time_s[0]
+        self._points = _Points()
+        yield from self._advance(free_um - CLEAR_UM)
+        base = yield from self._baseline()
+        rested_s = self._points.time_s[0] - began_s
+        if rested_s < push.rest_s:
+            yield push.rest_s - rested_s
+        yield from self._measure(push.search_average_s, loading=True)
+        return base
 
     def _note_contact(self, probe_um: float, std_um: float) -> None:
         off = probe_um - self._foreseen_um()

@@ -215,7 +215,7 @@ class Bench(HandlingContext):
         return force
 
 
-def carried_out(steps: Steps) -> None:
+def carried_out(steps: Steps, clock: ManualClock | None = None) -> None:
     result: object = None
     while True:
         try:
@@ -223,6 +223,8 @@ def carried_out(steps: Steps) -> None:
         except StopIteration:
             return
         result = wish.wait(0.0) if hasattr(wish, "wait") else None
+        if clock is not None and isinstance(wish, float):
+            clock.sleep(wish)
 
 
 @pytest.mark.parametrize("off_um", [-30.0, 45.0])
@@ -237,6 +239,19 @@ def test_the_stiffness_is_found_and_the_sensor_spared(ei_n_m2: float, off_um: fl
     found = fit_bending(fibre.spans, settings=fit)
     assert found.ei_n_m2 == pytest.approx(ei_n_m2, rel=0.06 if ei_n_m2 < 2e-10 else 0.15)
     assert found.ei_low_n_m2 < ei_n_m2 < found.ei_high_n_m2
+
+
+def test_stages_rest_before_the_first_push_while_the_fibre_is_looked_for():
+    bench = Bench(5e-11, off_um=20.0)
+    assert isinstance(bench.clock, ManualClock)
+    carried_out(PushSpans().run(bench), bench.clock)
+    first, second = bench.held_fibre().spans[:2]
+    met = int(np.argmax(first.force_un - ZERO_UN > 0.6))
+    rest_s = bench.settings.push.rest_s
+    # It was looked for, and found, before what counts began; that took no time of its own.
+    assert first.probe_um[met] - first.probe_um[0] < 15.0
+    assert rest_s <= first.time_s[met - 1] <= rest_s + 0.5
+    assert second.time_s[-1] - second.time_s[0] < first.time_s[-1] - first.time_s[0]
 
 
 @pytest.mark.parametrize("off_um", [0.0, 1.5, 3.0, 4.5, 6.0, 7.5])
@@ -275,7 +290,9 @@ def test_a_fibre_is_slid_where_it_is_pressed_far_enough_and_by_half_of_its_push(
             (span.nominal_um + CLAMP_UM) ** 3 / (3.0 * ei_n_m2 * 1e18) + 1.0 / SENSOR_UN_UM
         )
         before_un = span.force_un[span.freed.after] - ZERO_UN
-        pressed_um, stroke_um = before_un / k_un_um, float(np.ptp(span.force_un)) / k_un_um
+        # The search before may have gone farther than the push: it is not in its steps.
+        pushed_un = span.force_un[span.freed.after + 1 :]
+        pressed_um, stroke_um = before_un / k_un_um, float(np.ptp(pushed_un)) / k_un_um
         wanted_um = min(bench.settings.push.slide_um / 4.0, 0.5 * stroke_um)
         assert pressed_um > 0.65 * wanted_um
         # Of a soft fibre the force is small at first, and it is pressed until it is clear.

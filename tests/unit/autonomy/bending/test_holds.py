@@ -1,0 +1,97 @@
+"""What the slides of many fibres show tells how much one of them tells."""
+
+import dataclasses
+import math
+import statistics
+
+import numpy as np
+import pytest
+
+from cosmic.autonomy.bending import fit
+from cosmic.autonomy.bending.fit import (
+    MeasuredFibre,
+    assess_campaign,
+    half_width_percent,
+    measure_fibre,
+)
+from cosmic.autonomy.bending.holds import UNKNOWN_HOLDS, holds_of
+from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.autonomy.bending.span import Freed
+from unit.autonomy.bending.test_fit_bending import pushed, rig
+from unit.autonomy.bending.test_freed import AFTER, LEVEL_UN
+
+NOISE = 0.06
+FIBRES = 8
+
+
+def slid(seed: int, held: float) -> MeasuredFibre:
+    """Return a fibre of which friction takes a part, by slides that tell it with some noise."""
+    random, spans = np.random.default_rng(seed), []
+    for span in pushed(rig(seed)):
+        force = LEVEL_UN + (span.force_un - LEVEL_UN) / (1.0 - held)
+        before = force[AFTER] - LEVEL_UN
+        after = np.array([LEVEL_UN + before * (1.0 - held + random.normal(0.0, NOISE))])
+        # Up and down are one reading here.
+        freed = Freed(AFTER, after, after, math.sqrt(2.0) * NOISE * before, 0.2)
+        spans.append(dataclasses.replace(span, force_un=force, freed=freed))
+    return measure_fibre(spans, settings=FitSettings())
+
+
+def widths(holds: list[float], monkeypatch: pytest.MonkeyPatch) -> tuple[float, float]:
+    """Return median half widths in per cent: each slide by itself, and as the others show."""
+    fibres = [slid(seed, held) for seed, held in enumerate(holds)]
+    together = assess_campaign(fibres).fibres
+    with monkeypatch.context() as patched:
+        patched.setattr(fit, "holds_of", lambda _: UNKNOWN_HOLDS)
+        alone = assess_campaign(fibres).fibres
+    found = [statistics.median(half_width_percent(each) for each in of) for of in (alone, together)]
+    return found[0], found[1]
+
+
+def test_where_no_fibre_is_held_little_is_believed_of_the_next() -> None:
+    fibres = [slid(seed, 0.0) for seed in range(FIBRES)]
+    holds = holds_of([each.spans for each in fibres])
+    assert abs(holds.mean) < 0.02
+    assert holds.std < 0.03
+    assert holds.twisted < 0.02
+
+
+def test_fibres_that_are_held_very_differently_teach_nothing_of_the_next() -> None:
+    parts = [0.0, 0.25, 0.02, 0.12, 0.05, 0.2, 0.0, 0.08]
+    fibres = [slid(seed, held) for seed, held in enumerate(parts)]
+    holds = holds_of([each.spans for each in fibres])
+    assert holds.std > 0.06
+    found = assess_campaign(fibres).fibres
+    free = [assess_campaign([slid(seed, 0.0)]).fibres[0] for seed in range(FIBRES)]
+    for one, other in zip(found, free, strict=True):
+        assert one.ei_low_n_m2 < other.ei_n_m2 < one.ei_high_n_m2
+
+
+def test_intervals_are_narrower_by_it_only_where_fibres_are_alike(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    alone, together = widths([0.0] * FIBRES, monkeypatch)
+    assert together < 0.97 * alone
+    alone, together = widths([0.0, 0.25, 0.02, 0.12, 0.05, 0.2, 0.0, 0.08], monkeypatch)
+    assert together == pytest.approx(alone, rel=0.05)
+
+
+def test_one_fibre_tells_nothing_of_others() -> None:
+    assert holds_of([slid(1, 0.1).spans]) == UNKNOWN_HOLDS
+    assert holds_of([]) == UNKNOWN_HOLDS
+    never = [measure_fibre(pushed(rig(n)), settings=FitSettings()).spans for n in range(3)]
+    assert holds_of(never) == UNKNOWN_HOLDS
+
+
+@pytest.mark.parametrize("noise_times", [0.2, 5.0])
+def test_holds_are_told_whatever_the_noise_is_said_to_be(noise_times: float) -> None:
+    fibres = [
+        [
+            dataclasses.replace(each, freed_std_part=each.freed_std_part * noise_times)
+            for each in slid(seed, 0.1).spans
+        ]
+        for seed in range(FIBRES)
+    ]
+    holds = holds_of(fibres)
+    assert holds.mean == pytest.approx(math.log(0.9), abs=0.03)
+    assert math.isfinite(holds.std)
