@@ -4,11 +4,14 @@ from collections.abc import Callable
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractSlider,
     QAbstractSpinBox,
     QApplication,
     QComboBox,
+    QDialog,
     QLineEdit,
     QMenu,
     QMenuBar,
@@ -19,7 +22,11 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from cosmic.app.panels.campaign.dock import CAMPAIGN
+from cosmic.app.panels.procedures import TRAJECTORIES
+from cosmic.app.panels.recorded import RECORDER
 from cosmic.app.windows.operator_window import OperatorWindow
+from cosmic.frame.gui.stop_button import StopButton
 from gui.app.windows import Make, card, go_to
 from gui.frame.wheel import turn
 from gui.mico.panels import part, position
@@ -105,3 +112,30 @@ def test_escape_leaves_a_platform_alone_that_stands(window: OperatorWindow, qtbo
     qtbot.keyClick(window, ESCAPE)
     QApplication.processEvents()
     assert not window.top_bar.latched
+
+
+def test_stop_is_clicked_beside_every_dialog_that_the_window_opens(
+    make: Make, qtbot: QtBot
+) -> None:
+    window = make(applications=("mico", "daqco", "vico"), hardware=False)
+    texts = ("Limit…", "Open…", "Save…", "Folder…")
+
+    def buttons() -> list[QPushButton]:
+        return [each for each in window.findChildren(QPushButton) if each.text() in texts]
+
+    for count, title in enumerate((RECORDER, TRAJECTORIES, CAMPAIGN), 2):
+        window.raise_panel(title)
+        qtbot.waitUntil(lambda count=count: len(buttons()) >= count)
+    about = next(a for a in window.findChildren(QAction) if a.text() == "&About")
+    keep = next(a for a in window.findChildren(QAction) if a.text() == "&Keep as…")
+    for opens in (*(each.clicked.emit for each in buttons()), about.trigger, keep.trigger):
+        opens()
+        dialogs = [each for each in window.findChildren(QDialog) if each.isVisible()]
+        assert len(dialogs) == 1
+        with qtbot.waitSignal(window.stop_requested):
+            stop = window.top_bar.findChildren(StopButton)[0]
+            at = stop.mapTo(window, stop.rect().center())
+            QTest.mouseClick(
+                window.windowHandle(), Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, at
+            )
+        dialogs[0].reject()

@@ -1,8 +1,10 @@
-"""The questions which directory, and which file to write."""
+"""The questions which directory, and which file to read or to write."""
 
 from collections.abc import Callable
 
 from PySide6.QtWidgets import QFileDialog, QWidget
+
+from cosmic.frame.gui.beside import open_beside
 
 
 def ask_directory(parent: QWidget, title: str, start: str, chosen: Callable[[str], object]) -> None:
@@ -12,7 +14,18 @@ def ask_directory(parent: QWidget, title: str, start: str, chosen: Callable[[str
     dialog.setOption(QFileDialog.Option.ShowDirsOnly)
     dialog.fileSelected.connect(chosen)
     dialog.finished.connect(dialog.deleteLater)
-    dialog.open()
+    open_beside(dialog)
+
+
+def ask_open_file(
+    parent: QWidget, title: str, start: str, *, files: str, chosen: Callable[[str], object]
+) -> None:
+    """Open a dialog that calls `chosen` with a file there is; returns at once."""
+    dialog = QFileDialog(parent, title, start, files)
+    dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+    dialog.fileSelected.connect(chosen)
+    dialog.finished.connect(dialog.deleteLater)
+    open_beside(dialog)
 
 
 def ask_save_file(
@@ -33,5 +46,5 @@ def ask_save_file(
     dialog.setDefaultSuffix(suffix)
     dialog.fileSelected.connect(chosen)
     dialog.finished.connect(dialog.deleteLater)
-    dialog.open()
+    open_beside(dialog)
     return dialog

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QTimer, Signal
-from PySide6.QtWidgets import QComboBox, QFileDialog, QLineEdit, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QLineEdit, QTabWidget, QVBoxLayout, QWidget
 
 from cosmic.app.panels.campaign.board import CampaignBoard
 from cosmic.app.panels.campaign.fibre_card import FibreCard
@@ -23,7 +23,7 @@ from cosmic.autonomy.procedures.run import RunState
 from cosmic.autonomy.procedures.tree import NodeView, ProcedureTreeState
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.gui.ask_directory import ask_directory
+from cosmic.frame.gui.ask_directory import ask_directory, ask_open_file
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
@@ -231,10 +231,9 @@ class CampaignPanel(QWidget):
     def _on_recipe(self) -> None:
         if self.recipe.currentText() == OTHER:
             self.recipe.setCurrentIndex(0)
-            dialog = QFileDialog(self, "Recipe", str(self._home), "Recipes (*.toml)")
-            dialog.fileSelected.connect(self.use_recipe)
-            dialog.finished.connect(dialog.deleteLater)
-            dialog.open()
+            ask_open_file(
+                self, "Recipe", str(self._home), files="Recipes (*.toml)", chosen=self.use_recipe
+            )
             return
         self._suggest_folder()
 
