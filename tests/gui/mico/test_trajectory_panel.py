@@ -207,6 +207,30 @@ def test_poses_are_taught_gone_to_and_offered_to_recordings(
     assert mico.poses.names == []
 
 
+def test_nothing_is_moved_under_an_operation_that_moves_the_axes(
+    panel: TrajectoryPanel,
+    mico: Mico,
+    qtbot: QtBot,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    before = at(panel, mico, "left.x")
+    mico.poses.teach("here", ["left.x"])
+    mico["left.x"].move_to(before + 20.0)
+    opened(panel, qtbot, tmp_path, HEAD + "left.x by 5 um\n")
+    qtbot.waitUntil(lambda: panel.trajectory is not None)
+    monkeypatch.setattr(mico.application, "busy", lambda: "take with left moves the axes")
+    panel.poses_box.refresh()
+    panel.poses_box.poses.setCurrentText("here")
+    click(qtbot, panel.poses_box, "goPose")
+    assert panel.poses_box.message.text() == "take with left moves the axes"
+    panel.run_bar.run.click()
+    assert panel.report.text() == "take with left moves the axes"
+    qtbot.wait(200)
+    assert at(panel, mico, "left.x") == pytest.approx(before + 20.0, abs=1.0)
+    mico.poses.remove("here")
+
+
 def test_a_rehearsal_is_shown_with_its_own_trajectory_only(
     panel: TrajectoryPanel, mico: Mico, qtbot: QtBot, tmp_path: Path
 ) -> None:

@@ -6,7 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QLineEdit, QVBoxLayout, QWidget
 
-from cosmic.frame.errors import CosmicError
+from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.relay import Relay
@@ -122,6 +122,8 @@ class PosesBox(QWidget):
     def _go(self, *, around: bool) -> None:
         """Begin to go; how it ends is shown by the window's task bar."""
         try:
+            if why := self._mico.application.busy():
+                raise NotAvailable(why)
             task = self._mico.poses.go(self.poses.currentText(), detour=around, wait=False)
         except CosmicError as exc:
             self.message.set_text(str(exc))
