@@ -198,6 +198,13 @@ def test_poses_are_taught_gone_to_and_offered_to_recordings(
     offered = panel.record_bar.pose
     assert [offered.itemText(n) for n in range(offered.count())] == ["no pose", "over the fibre"]
     before = at(panel, mico, "left.x")
+    qtbot.keyClicks(part(box, "poseName", QLineEdit), "over the fibre")
+    box.group.setCurrentText("all axes")
+    click(qtbot, box, "teachPose")
+    assert "There is a pose over the fibre already" in box.message.text()
+    assert len(mico.poses["over the fibre"].positions) == 3
+    click(qtbot, box, "teachPose")
+    assert len(mico.poses["over the fibre"].positions) > 3
     movement = mico["left.x"].move_to(before + 90.0, wait=False)
     qtbot.waitUntil(lambda: movement.done)
     click(qtbot, box, "goPose")

@@ -48,6 +48,7 @@ class PosesBox(QWidget):
         self.group.addItems([ALL, *(each.title for each in self._settings_groups())])
         self.teach = named(push_button("Teach", "Keep the positions of the axes now"), "teachPose")
         self.message = ElidedLabel()
+        self._replaced = ""  # the pose that the operator was told is there already
         self._arrange()
         self.go.clicked.connect(lambda: self._go(around=False))
         self.around.clicked.connect(lambda: self._go(around=True))
@@ -95,6 +96,11 @@ class PosesBox(QWidget):
     def _on_teach(self) -> None:
         name, group = self.name.text().strip(), self.group.currentText()
         poses, axes = self._mico.poses, None if group == ALL else group
+        if name in poses.names and name != self._replaced:
+            self._replaced = name
+            self.message.set_text(f"There is a pose {name} already: Teach again replaces it")
+            return
+        self._replaced = ""
         self._mico.carry_out(lambda: poses.teach(name, axes), self._taught)
 
     def _on_taught(self, pose: Pose | None, error: CosmicError | None) -> None:
