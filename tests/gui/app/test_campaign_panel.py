@@ -131,6 +131,16 @@ def test_a_campaign_that_cannot_begin_says_why_and_nothing_runs(panel, qtbot, tm
     assert panel.recipe.isEnabled()
 
 
+@pytest.mark.parametrize("page", range(3))
+def test_it_is_begun_and_steered_on_every_page(panel, qtbot, tmp_path, page: int) -> None:
+    panel.tabs.setCurrentIndex(page)
+    steering = (panel.procedure.start, panel.procedure.pause, panel.procedure.abort)
+    assert all(each.isVisible() for each in steering)
+    panel.folder.setText(str(tmp_path / "taken"))
+    press(qtbot, panel.procedure.start)
+    assert panel.procedure.reason.isVisible(), "why it is refused is seen"
+
+
 def test_start_opens_the_chosen_recipe_in_the_folder_that_is_shown(
     panel, qtbot, tmp_path, opened
 ) -> None:

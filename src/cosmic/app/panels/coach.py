@@ -73,9 +73,7 @@ class Coach(QFrame):
         self.off.setChecked(str(settings.value(_KEY, "")).lower() == "true")
         self.off.clicked.connect(self._on_off)
         self._name_off()
-        self.words = named(QLabel(), "coachWords")
-        self.words.setWordWrap(True)
-        self.words.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
+        self.words = named(_words(), "coachWords")
         line_px = self.words.fontMetrics().lineSpacing()
         # Long words scroll by themselves in a low panel: the button below them is always seen.
         room = named(QScrollArea(), "coachRoom")
@@ -141,3 +139,15 @@ class Coach(QFrame):
         self._name_off()
         self._settings.setValue(_KEY, "true" if self.off.isChecked() else "false")
         self.look()
+
+
+def _words() -> QLabel:
+    """Return the label for what is proposed; one long word in it cuts no other off."""
+    label = QLabel()
+    label.setWordWrap(True)
+    label.setTextFormat(Qt.TextFormat.PlainText)
+    label.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
+    policy = label.sizePolicy()
+    policy.setHorizontalPolicy(QSizePolicy.Policy.Ignored)
+    label.setSizePolicy(policy)
+    return label

@@ -204,13 +204,14 @@ class CampaignPanel(QWidget):
         self.tabs.addTab(FittedPanel(self.board), "Fibres")
         self.tabs.addTab(FittedPanel(self.card), "Fibre")
         whole = QVBoxLayout(self)
-        whole.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, 0)
+        whole.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
         whole.setSpacing(STEP_PX)
         whole.addWidget(head)
         whole.addWidget(self.about)
         whole.addWidget(self.folder)
         whole.addWidget(self.message)
         whole.addWidget(self.tabs, 1)
+        whole.addWidget(self.procedure.buttons)  # whichever page is in front
         self.message.hide()
 
     def _connect(self) -> None:
@@ -218,6 +219,7 @@ class CampaignPanel(QWidget):
         self.choose.clicked.connect(self._on_choose)
         self.report.clicked.connect(self.write_report)
         self.plate.clicked.connect(self.confirm_plate)
+        self.procedure.refused.connect(lambda: self.tabs.setCurrentWidget(self.procedure))
         self.card.replay_requested.connect(self._on_replay)
         self.board.fibre_chosen.connect(self.show_fibre)
 
