@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog
 
-from cosmic.app.panels.campaign.panel import CampaignPanel
+from cosmic.app.panels.campaign.panel import OTHER, CampaignPanel
 from cosmic.app.panels.scene_replay import poses_of
 from cosmic.app.windows.top_bar import ACM, blocked_modes
 from cosmic.autonomy.campaign.campaign import CampaignPhase
@@ -139,6 +140,15 @@ def test_it_is_begun_and_steered_on_every_page(panel, qtbot, tmp_path, page: int
     panel.folder.setText(str(tmp_path / "taken"))
     press(qtbot, panel.procedure.start)
     assert panel.procedure.reason.isVisible(), "why it is refused is seen"
+
+
+def test_a_recipe_that_is_not_chosen_after_all_leaves_the_one_before(panel, qtbot) -> None:
+    panel.recipe.setCurrentText(OTHER)
+    panel.recipe.activated.emit(panel.recipe.currentIndex())
+    dialog = panel.findChild(QFileDialog)
+    dialog.reject()
+    assert panel.recipe.currentText() == "quick"
+    assert Path(panel.folder.text()).name.startswith("quick-")
 
 
 def test_start_opens_the_chosen_recipe_in_the_folder_that_is_shown(

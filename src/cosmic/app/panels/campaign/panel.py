@@ -163,6 +163,7 @@ class CampaignPanel(QWidget):
         self._writing: JobQueue | None = None
         self._campaign: Campaign | None = None
         self._card: FibreRecord | None = None
+        self._recipe = _FIRST
         self._changed_relay = Relay(self._on_changed)
         self._written_relay = Relay(self._on_written)
         self._make_widgets()
@@ -232,7 +233,7 @@ class CampaignPanel(QWidget):
 
     def _on_recipe(self) -> None:
         if self.recipe.currentText() == OTHER:
-            self.recipe.setCurrentIndex(0)
+            self.recipe.setCurrentText(self._recipe)  # nothing else is chosen by a cancel
             ask_open_file(
                 self, "Recipe", str(self._home), files="Recipes (*.toml)", chosen=self.use_recipe
             )
@@ -247,6 +248,7 @@ class CampaignPanel(QWidget):
         self._suggest_folder()
 
     def _suggest_folder(self) -> None:
+        self._recipe = self.recipe.currentText()
         self._show_about()
         name = Path(self.recipe.currentText()).stem
         self.folder.setText(str(self._home / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"))
