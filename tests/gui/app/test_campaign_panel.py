@@ -49,6 +49,7 @@ class StoredCampaign:
         self.run = None
         self.end_reason, self.operation, self.left_s = "", "", float("nan")
         self.request = ""
+        self.listeners: list = []
 
     @property
     def over(self) -> bool:
@@ -67,7 +68,8 @@ class StoredCampaign:
         return progress(self.fibres, 100.0)
 
     def on_change(self, listener):
-        return lambda: None
+        self.listeners.append(listener)
+        return lambda: self.listeners.remove(listener)
 
     def start(self) -> None:
         self.phase, self.end_reason = CampaignPhase.ENDED, "2 fibres done"
@@ -140,6 +142,19 @@ def test_it_is_begun_and_steered_on_every_page(panel, qtbot, tmp_path, page: int
     panel.folder.setText(str(tmp_path / "taken"))
     press(qtbot, panel.procedure.start)
     assert panel.procedure.reason.isVisible(), "why it is refused is seen"
+
+
+def test_its_buttons_follow_it_on_every_page(panel, qtbot, tmp_path) -> None:
+    panel.folder.setText(str(tmp_path / "here"))
+    press(qtbot, panel.procedure.step)  # begun, and paused
+    panel.tabs.setCurrentIndex(1)
+    buttons = panel.procedure
+    assert (buttons.start.isEnabled(), buttons.abort.isEnabled()) == (False, True)
+    panel.campaign.abort("a hand on the button")
+    for listener in panel.campaign.listeners:
+        listener()
+    qtbot.waitUntil(buttons.resume.isEnabled)
+    qtbot.waitUntil(lambda: not buttons.abort.isEnabled())
 
 
 def test_a_recipe_that_is_not_chosen_after_all_leaves_the_one_before(panel, qtbot) -> None:

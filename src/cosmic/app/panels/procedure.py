@@ -315,8 +315,11 @@ class ProcedureTreePanel(QWidget):
     # Showing
 
     def _on_changed(self) -> None:
-        if self.isVisible() and not self._redraw.isActive():
+        if self._is_seen() and not self._redraw.isActive():
             self._redraw.start()
+
+    def _is_seen(self) -> bool:
+        return self.isVisible() or self.buttons.isVisible()
 
     def refresh(self) -> None:
         """Show the run as it is now."""
@@ -361,7 +364,8 @@ class ProcedureTreePanel(QWidget):
     @override
     def hideEvent(self, event: QHideEvent) -> None:
         super().hideEvent(event)
-        self._redraw.stop()
+        if not self._is_seen():
+            self._redraw.stop()
         self._tick.stop()
 
     @override
