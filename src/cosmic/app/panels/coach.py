@@ -7,7 +7,6 @@ from typing import Final
 from PySide6.QtCore import QSettings, Qt, QTimer
 from PySide6.QtWidgets import (
     QFrame,
-    QLabel,
     QPushButton,
     QScrollArea,
     QSizePolicy,
@@ -15,7 +14,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from cosmic.frame.gui.build import named, push_button, styled, tight_row
+from cosmic.frame.gui.build import named, push_button, styled, tight_row, wrapped_label
 from cosmic.frame.gui.key_focus import set_shown
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.units import with_micro_signs
@@ -73,7 +72,7 @@ class Coach(QFrame):
         self.off.setChecked(str(settings.value(_KEY, "")).lower() == "true")
         self.off.clicked.connect(self._on_off)
         self._name_off()
-        self.words = named(_words(), "coachWords")
+        self.words = named(wrapped_label(), "coachWords")
         line_px = self.words.fontMetrics().lineSpacing()
         # Long words scroll by themselves in a low panel: the button below them is always seen.
         room = named(QScrollArea(), "coachRoom")
@@ -139,15 +138,3 @@ class Coach(QFrame):
         self._name_off()
         self._settings.setValue(_KEY, "true" if self.off.isChecked() else "false")
         self.look()
-
-
-def _words() -> QLabel:
-    """Return the label for what is proposed; one long word in it cuts no other off."""
-    label = QLabel()
-    label.setWordWrap(True)
-    label.setTextFormat(Qt.TextFormat.PlainText)
-    label.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
-    policy = label.sizePolicy()
-    policy.setHorizontalPolicy(QSizePolicy.Policy.Ignored)
-    label.setSizePolicy(policy)
-    return label
