@@ -305,7 +305,7 @@ class RecordBar(QWidget):
     def _on_lapse(self) -> None:
         dialog = TimeLapseDialog(self)
         dialog.agreed.connect(self.begin_lapse)
-        dialog.open()
+        open_beside(dialog)
 
     def begin_lapse(self, interval_s: float, count: int) -> None:
         """Record `count` images, one each `interval_s`."""
