@@ -139,7 +139,7 @@ def test_the_chosen_alarm_is_acknowledged_though_another_one_came_meanwhile(qtbo
     assert [each.source for each in book.unseen] == ["second"], "the newest, as none is chosen"
 
 
-def test_a_crossed_limit_is_told_with_its_value_and_unit(make: Make, qtbot: QtBot) -> None:
+def test_a_crossed_limit_is_reported_with_its_value_and_unit(make: Make, qtbot: QtBot) -> None:
     window = make(applications=("mico", "daqco", "vico"), rate=2.0)
     assert window.tasks is not None
     assert window.platform.daqco is not None
