@@ -150,7 +150,7 @@ class ToolPanel(QWidget):
         self._steps: dict[str, float] = {}
         self._stopped = ""
         self._verdict: MoveVerdict | None = None
-        self._replaced = ""  # the pose that the operator was told is there already
+        self._replaced = ""  # the pose that was said to be there already
         self._last: tuple[str, Callable[[], None]] | None = None
         self._shown: Shown = USUAL
         self._detour_by_click: Callable[[], None] | None = None

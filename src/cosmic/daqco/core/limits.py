@@ -102,7 +102,7 @@ class LimitGuard:
     check : callable
         Called with a limit before it is armed; what it raises forbids that.
     unit_of : callable
-        Returns the unit of a channel, for what is told.
+        Returns the unit of a channel, for what is reported.
     """
 
     def __init__(self, clock: Clock, trip: Callable[[str], None] | None = None) -> None:

@@ -48,7 +48,7 @@ class PosesBox(QWidget):
         self.group.addItems([ALL, *(each.title for each in self._settings_groups())])
         self.teach = named(push_button("Teach", "Keep the positions of the axes now"), "teachPose")
         self.message = ElidedLabel()
-        self._replaced = ""  # the pose that the operator was told is there already
+        self._replaced = ""  # the pose that was said to be there already
         self._arrange()
         self.go.clicked.connect(lambda: self._go(around=False))
         self.around.clicked.connect(lambda: self._go(around=True))
