@@ -72,6 +72,8 @@ def test_what_is_found_is_shown_and_nothing_is_written_unasked(
     assert "device 0 channel 1: linear, position" in said
     assert "device 3 channel 0: rotary" in said
     assert 'name = "device0.channel1"' in said
+    assert "No sensor answers at device 2 channel 2, device 3 channel 1" in said
+    assert 'device = 2\nchannel = 2\nkind = "open-loop"' in said
     assert (folder / "platform.toml").read_text(encoding="utf-8") == PLATFORM
 
 

@@ -88,13 +88,11 @@ def _os_words(error: OSError) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    platform = _platform_options()
-    window = _window_options(platform)
     parser = argparse.ArgumentParser(
         prog="cosmic",
         description="Control software for a microrobotic platform. Without a command: the "
         "operator's window with all applications of the platform file.",
-        parents=[window],
+        parents=[_window_options(_platform_options())],
     )
     parser.set_defaults(
         config=None,
@@ -113,6 +111,9 @@ def _parser() -> argparse.ArgumentParser:
         certificates=None,
         connect=None,
     )
+    # Others than those above, whose defaults have just been set: a command would set them again.
+    platform = _platform_options()
+    window = _window_options(platform)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.add_parser("mico", help="the window of MiCo alone", parents=[window])
     commands.add_parser("daqco", help="the window of DAQCo alone", parents=[window])
@@ -147,7 +148,9 @@ def _add_session(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     pack.add_argument("sources", type=Path, nargs="+", metavar="FILE_OR_FOLDER")
     pack.add_argument("--output", type=Path, required=True, metavar="FILE.zip")
     pack.add_argument("--title", default="", metavar="TEXT", help="title of the session")
-    pack.add_argument("--config", type=Path, default=None, metavar="PATH", help="platform file")
+    pack.add_argument(
+        "--config", type=Path, default=argparse.SUPPRESS, metavar="PATH", help="platform file"
+    )
     pack.add_argument("--audit", action="store_true", help="with this computer's audit trail")
 
 
@@ -160,7 +163,9 @@ def _add_file_commands(
     doctor = commands.add_parser(
         "doctor", help="what is on this computer, what is missing, and what to do about it"
     )
-    doctor.add_argument("--config", type=Path, default=None, metavar="PATH", help=_CONFIG)
+    doctor.add_argument(
+        "--config", type=Path, default=argparse.SUPPRESS, metavar="PATH", help=_CONFIG
+    )
     doctor.add_argument("--json", action="store_true", help="for programs")
     init = commands.add_parser("init", help="copy the shipped configuration out, to change it")
     init.add_argument("folder", type=Path, metavar="FOLDER")
@@ -183,7 +188,9 @@ def _add_file_commands(
     setup = commands.add_parser(
         "setup", help="turn axes that are found and not configured into entries of the files"
     )
-    setup.add_argument("--config", type=Path, default=None, metavar="PATH", help=_CONFIG)
+    setup.add_argument(
+        "--config", type=Path, default=argparse.SUPPRESS, metavar="PATH", help=_CONFIG
+    )
     setup.add_argument("--move", action="store_true", help="offer to move each a little")
     setup.add_argument("--write", action="store_true", help="add the entries; comments are kept")
     _add_measure(commands)

@@ -83,4 +83,6 @@ def calibration_on(
     for entry in registry.entries:
         if entry.name in anew:
             registry.forget(*entry.key)
-    return build_calibrate(settings, zooms=zooms), HandlingContext.on(rig, settings)
+    procedure, work = build_calibrate(settings, zooms=zooms), HandlingContext.on(rig, settings)
+    work.command_as(procedure.name, rig.mico)
+    return procedure, work

@@ -15,6 +15,7 @@ from cosmic.frame.errors import RecordingError
 
 RESERVE_BYTES: Final = 32 * 1024 * 1024
 LONGEST_BASE_BYTES: Final = 200
+_SHOWN: Final = 16
 FORBIDDEN: Final = '/\\<>:"|?*'
 # Windows keeps these for devices, whatever the ending.
 DEVICE_NAME: Final = re.compile(r"(?i)^(con|prn|aux|nul|com\d|lpt\d)(\..*)?$")
@@ -55,20 +56,21 @@ def check_base_name(base: str) -> str:
     name = base.strip()
     if not name:
         raise RecordingError("the recording has no name; give it one")
+    if len(name.encode("utf-8", "replace")) > LONGEST_BASE_BYTES:
+        raise RecordingError(f"the name is longer than {LONGEST_BASE_BYTES} bytes; shorten it")
+    shown = name if len(name) <= _SHOWN else f"{name[:_SHOWN]}…"  # the reason comes after it
     wrong = sorted({each for each in name if each in FORBIDDEN})
     if wrong:
         raise RecordingError(
-            f"name {name!r}: {' '.join(wrong)} cannot be part of a file's name; "
+            f"name {shown!r}: {' '.join(wrong)} cannot be part of a file's name; "
             "a directory belongs into its own field"
         )
     if any(unicodedata.category(each) in {"Cc", "Cs"} for each in name):
-        raise RecordingError(f"name {name!r}: it has characters that cannot be printed")
+        raise RecordingError(f"name {shown!r}: it has characters that cannot be printed")
     if name.startswith(".") or name.endswith("."):
-        raise RecordingError(f"name {name!r}: a full stop cannot be its first or last character")
+        raise RecordingError(f"name {shown!r}: a full stop cannot be its first or last character")
     if DEVICE_NAME.match(name):
-        raise RecordingError(f"name {name!r}: Windows keeps this name for a device")
-    if len(name.encode("utf-8")) > LONGEST_BASE_BYTES:
-        raise RecordingError(f"the name is longer than {LONGEST_BASE_BYTES} bytes; shorten it")
+        raise RecordingError(f"name {shown!r}: Windows keeps this name for a device")
     return name
 
 

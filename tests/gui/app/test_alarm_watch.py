@@ -1,6 +1,7 @@
 """Alarms by level and rate: said once, graver again, over when better, with a sound if wanted."""
 
 import logging
+import re
 
 import pytest
 from PySide6.QtCore import Qt
@@ -13,9 +14,11 @@ from cosmic.app.configuration.alarms import (
     FallingLevels,
     RisingLevels,
 )
-from cosmic.app.panels.alarms import AlarmBook, Level
+from cosmic.app.panels.alarms import AlarmBook, AlarmPanel, Level
 from cosmic.app.windows import alarm_watch
 from cosmic.app.windows.alarm_watch import AlarmWatch, Quantity
+from cosmic.daqco.api.daqco import daqco_of
+from cosmic.daqco.core.settings import LimitSettings
 from gui.app.windows import Make
 from gui.mico.panels import part
 
@@ -116,6 +119,36 @@ def test_an_alarm_and_its_acknowledgement_stand_in_the_log(
         "Alarm, critical: The force is 90 uN. Go back.",
         "Alarm acknowledged: The force is 90 uN.",
     ]
+
+
+def test_the_chosen_alarm_is_acknowledged_though_another_one_came_meanwhile(qtbot: QtBot) -> None:
+    book = AlarmBook()
+    panel = AlarmPanel(book)
+    qtbot.addWidget(panel)
+    for source in ("first", "second"):
+        book.raise_alarm(source, Level.WARNING, f"the {source}")
+    panel.list.setCurrentItem(panel.list.topLevelItem(1))
+    book.raise_alarm("third", Level.CRITICAL, "the third")
+    qtbot.mouseClick(panel.one, Qt.MouseButton.LeftButton)
+    assert {each.source: each.seen for each in book.alarms} == {
+        "first": True,
+        "second": False,
+        "third": False,
+    }
+    qtbot.mouseClick(panel.one, Qt.MouseButton.LeftButton)
+    assert [each.source for each in book.unseen] == ["second"], "the newest, as none is chosen"
+
+
+def test_a_crossed_limit_is_reported_with_its_value_and_unit(make: Make, qtbot: QtBot) -> None:
+    window = make(applications=("mico", "daqco", "vico"), rate=2.0)
+    assert window.tasks is not None
+    assert window.platform.daqco is not None
+    book, daqco = window.tasks.book, daqco_of(window.platform.daqco)
+    qtbot.waitUntil(lambda: daqco.running and bool(daqco.limits))
+    daqco.set_limit(LimitSettings(channel="force", low=-150.0, high=0.5, armed=True))
+    qtbot.waitUntil(lambda: any(each.source == "limit force" for each in book.alarms))
+    cause = next(each.cause for each in book.alarms if each.source == "limit force")
+    assert re.fullmatch(r"force crossed its limit at \d+\.\d+ uN", cause)
 
 
 def test_a_warning_above_the_critical_level_is_refused() -> None:

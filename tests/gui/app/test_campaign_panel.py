@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog
 
-from cosmic.app.panels.campaign.panel import CampaignPanel
+from cosmic.app.panels.campaign.panel import OTHER, CampaignPanel
 from cosmic.app.panels.scene_replay import poses_of
 from cosmic.app.windows.top_bar import ACM, blocked_modes
 from cosmic.autonomy.campaign.campaign import CampaignPhase
@@ -48,6 +49,7 @@ class StoredCampaign:
         self.run = None
         self.end_reason, self.operation, self.left_s = "", "", float("nan")
         self.request = ""
+        self.listeners: list = []
 
     @property
     def over(self) -> bool:
@@ -66,7 +68,8 @@ class StoredCampaign:
         return progress(self.fibres, 100.0)
 
     def on_change(self, listener):
-        return lambda: None
+        self.listeners.append(listener)
+        return lambda: self.listeners.remove(listener)
 
     def start(self) -> None:
         self.phase, self.end_reason = CampaignPhase.ENDED, "2 fibres done"
@@ -129,6 +132,38 @@ def test_a_campaign_that_cannot_begin_says_why_and_nothing_runs(panel, qtbot, tm
     assert "by another recipe" in panel.procedure.reason.text()
     assert panel.campaign is None
     assert panel.recipe.isEnabled()
+
+
+@pytest.mark.parametrize("page", range(3))
+def test_it_is_begun_and_steered_on_every_page(panel, qtbot, tmp_path, page: int) -> None:
+    panel.tabs.setCurrentIndex(page)
+    steering = (panel.procedure.start, panel.procedure.pause, panel.procedure.abort)
+    assert all(each.isVisible() for each in steering)
+    panel.folder.setText(str(tmp_path / "taken"))
+    press(qtbot, panel.procedure.start)
+    assert panel.procedure.reason.isVisible(), "why it is refused is seen"
+
+
+def test_its_buttons_follow_it_on_every_page(panel, qtbot, tmp_path) -> None:
+    panel.folder.setText(str(tmp_path / "here"))
+    press(qtbot, panel.procedure.step)  # begun, and paused
+    panel.tabs.setCurrentIndex(1)
+    buttons = panel.procedure
+    assert (buttons.start.isEnabled(), buttons.abort.isEnabled()) == (False, True)
+    panel.campaign.abort("a hand on the button")
+    for listener in panel.campaign.listeners:
+        listener()
+    qtbot.waitUntil(buttons.resume.isEnabled)
+    qtbot.waitUntil(lambda: not buttons.abort.isEnabled())
+
+
+def test_a_recipe_that_is_not_chosen_after_all_leaves_the_one_before(panel, qtbot) -> None:
+    panel.recipe.setCurrentText(OTHER)
+    panel.recipe.activated.emit(panel.recipe.currentIndex())
+    dialog = panel.findChild(QFileDialog)
+    dialog.reject()
+    assert panel.recipe.currentText() == "quick"
+    assert Path(panel.folder.text()).name.startswith("quick-")
 
 
 def test_start_opens_the_chosen_recipe_in_the_folder_that_is_shown(

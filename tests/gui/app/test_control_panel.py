@@ -64,6 +64,20 @@ def test_it_offers_channels_of_force_and_linear_axes(panel: ControlPanel) -> Non
     assert form.direction.currentData() == -1
 
 
+def test_no_loop_is_started_under_an_operation_that_moves_the_axes(
+    rig: cosmic.Rig, qtbot: QtBot
+) -> None:
+    before = rig.control.newest
+    panel = make_control_panel(rig, busy=lambda: "take with left moves the axes")
+    qtbot.addWidget(panel)
+    panel.show()
+    click(qtbot, panel, "start")
+    assert panel.state.text() == "refused"
+    assert panel.reason.text() == "take with left moves the axes"
+    assert rig.control.newest is before
+    panel.close()
+
+
 def test_a_loop_is_started_shown_changed_and_ended(
     rig: cosmic.Rig, panel: ControlPanel, qtbot: QtBot
 ) -> None:

@@ -6,7 +6,7 @@ from shutil import copytree
 
 import pytest
 from PySide6.QtCore import QSettings, Qt
-from PySide6.QtWidgets import QCheckBox, QPushButton, QToolButton
+from PySide6.QtWidgets import QCheckBox, QLabel, QPushButton, QToolButton
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.configuration.platform_file import load_platform
@@ -274,6 +274,18 @@ def test_a_cancel_while_it_moves_stops_there(make: Make, qtbot: QtBot) -> None:
     qtbot.waitUntil(lambda: shown.state is PreviewState.NONE and not moving(window), timeout=8000)
     assert position(card(window, "left.y")) < 1990.0
     assert not window.top_bar.latched
+
+
+def test_go_waits_while_an_operation_moves_the_axes(
+    blocked: OperatorWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    find(blocked, qtbot)
+    before = where(blocked)
+    application = mico(blocked).mico.application
+    monkeypatch.setattr(application, "busy", lambda: "take with left moves the axes")
+    click(qtbot, bar(blocked), "pathGo")
+    assert "take with left moves the axes" in part(bar(blocked), "pathWords", QLabel).text()
+    assert where(blocked) == before
 
 
 def test_go_looks_again_when_an_axis_moved_since(blocked: OperatorWindow, qtbot: QtBot) -> None:

@@ -1,14 +1,18 @@
 """What a hand that slips, a wheel that turns or an Escape too many must not do."""
 
 from collections.abc import Callable
+from typing import TypeVar
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractSlider,
     QAbstractSpinBox,
     QApplication,
     QComboBox,
+    QDialog,
     QLineEdit,
     QMenu,
     QMenuBar,
@@ -19,12 +23,17 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from cosmic.app.panels.campaign.dock import CAMPAIGN
+from cosmic.app.panels.procedures import TRAJECTORIES
+from cosmic.app.panels.recorded import RECORDER
 from cosmic.app.windows.operator_window import OperatorWindow
+from cosmic.frame.gui.stop_button import StopButton
 from gui.app.windows import Make, card, go_to
 from gui.frame.wheel import turn
 from gui.mico.panels import part, position
 
 ESCAPE = Qt.Key.Key_Escape
+Asking = TypeVar("Asking", QPushButton, QAction)
 
 
 @pytest.fixture
@@ -105,3 +114,35 @@ def test_escape_leaves_a_platform_alone_that_stands(window: OperatorWindow, qtbo
     qtbot.keyClick(window, ESCAPE)
     QApplication.processEvents()
     assert not window.top_bar.latched
+
+
+def test_stop_is_clicked_beside_every_dialog_that_the_window_opens(
+    make: Make, qtbot: QtBot
+) -> None:
+    window = make(applications=("mico", "daqco", "vico"), hardware=False)
+    for title in (RECORDER, TRAJECTORIES, CAMPAIGN):  # made when they are first seen
+        before = len(_asking(window, QPushButton))
+        window.raise_panel(title)
+        qtbot.waitUntil(lambda before=before: len(_asking(window, QPushButton)) > before)
+    buttons = [each.clicked.emit for each in _asking(window, QPushButton)]
+    actions = [each.trigger for each in _asking(window, QAction)]
+    actions += [each.trigger for each in window.findChildren(QAction) if each.text() == "&About"]
+    seen = set()
+    for opens in (*buttons, *actions):
+        opens()
+        dialogs = [each for each in window.findChildren(QDialog) if each.isVisible()]
+        with qtbot.waitSignal(window.stop_requested):
+            stop = window.top_bar.findChildren(StopButton)[0]
+            at = stop.mapTo(window, stop.rect().center())
+            QTest.mouseClick(
+                window.windowHandle(), Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, at
+            )
+        for each in dialogs:
+            seen.add(each.windowTitle())
+            each.reject()
+    assert len(seen) >= 10, seen
+
+
+def _asking(window: OperatorWindow, kind: type[Asking]) -> list[Asking]:
+    """What opens a dialog, by its three dots."""
+    return [each for each in window.findChildren(kind) if each.text().endswith("…")]

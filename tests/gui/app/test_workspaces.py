@@ -667,7 +667,36 @@ def test_a_pose_is_kept_by_a_name_and_offered_with_a_picture(
     assert tool.poses.currentText() == "before the probe"
     tool.poses.showPopup()
     assert not tool.poses.itemIcon(0).isNull()
-    tool.poses.hidePopup()
+    assert tool.poses.view().iconSize().width() > 0
+    qtbot.keyClick(tool.poses.view(), Qt.Key.Key_Escape)
+    assert tool.poses.iconSize().width() == 0, "beside the name there is no room for a picture"
+
+
+def test_a_pose_is_replaced_on_the_second_word_only(whole: OperatorWindow, qtbot: QtBot) -> None:
+    choose(whole, qtbot, HANDLE)
+    tool, poses = tasks(whole).tool, mico(whole).mico.poses
+    qtbot.waitUntil(lambda: mico(whole).cards["left.x"].axis.details.present)
+    poses.teach("twice", ["right.x"])
+    qtbot.mouseClick(tool.keep, LEFT)
+    tool.pose_name.setText("twice")
+    qtbot.keyClick(tool.pose_name, Qt.Key.Key_Return)
+    assert "There is a pose twice already" in tool.line.text()
+    assert list(poses["twice"].positions) == ["right.x"]
+    qtbot.keyClick(tool.pose_name, Qt.Key.Key_Return)
+    assert list(poses["twice"].positions) == ["left.x", "left.y", "left.z"]
+    assert not tool.pose_name.isVisible()
+    poses.remove("twice")
+
+
+def test_a_name_in_a_message_is_shown_as_it_was_typed(whole: OperatorWindow, qtbot: QtBot) -> None:
+    choose(whole, qtbot, HANDLE)
+    tool = tasks(whole).tool
+    qtbot.mouseClick(tool.keep, LEFT)
+    tool.pose_name.setText("<b>x</b>")
+    qtbot.keyClick(tool.pose_name, Qt.Key.Key_Return)
+    assert "<b>x</b>" in tool.line.text()
+    assert tool.line.textFormat() == Qt.TextFormat.PlainText
+    qtbot.mouseClick(tool.keep, LEFT)
 
 
 def test_one_key_swaps_image_and_scene(whole: OperatorWindow, qtbot: QtBot) -> None:
@@ -695,6 +724,22 @@ def test_the_drawer_opens_over_the_picture_and_escape_closes_it(
     qtbot.keyClick(whole, Qt.Key.Key_Escape)
     assert whole.drawer.open_page == ""
     assert not whole.top_bar.latched
+
+
+def test_an_open_drawer_stays_above_the_panels_of_another_workspace(
+    whole: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(whole, qtbot, SET_UP)
+    whole.raise_panel("Log")
+    choose(whole, qtbot, HANDLE)
+    body = whole.findChild(QWidget, "drawerBody")
+    corners = (body.rect().bottomLeft(), body.rect().bottomRight())
+    for corner in corners:
+        at = body.mapTo(whole, corner) + QPoint(4 if corner.x() == 0 else -4, -4)
+        found = whole.childAt(at)
+        assert found is not None
+        assert found is body or body.isAncestorOf(found)
+    whole.drawer.show_page("")
 
 
 def test_an_open_drawer_follows_the_size_of_the_window(whole: OperatorWindow, qtbot: QtBot) -> None:

@@ -1,13 +1,15 @@
 """Amounts in words, numbers that are typed, widgets in lines, the question before overwriting."""
 
 import math
+from functools import partial
+from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QLineEdit, QPushButton, QWidget
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QPushButton, QWidget
 
 from cosmic.frame.errors import QuantityError
 from cosmic.frame.gui.amounts import duration_text, size_text
-from cosmic.frame.gui.ask_directory import ask_save_file
+from cosmic.frame.gui.ask_directory import ask_directory, ask_open_file, ask_save_file
 from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.number_edit import NumberEdit, read_number
 from cosmic.frame.gui.overwrite_question import overwrite_question
@@ -132,3 +134,14 @@ def test_a_file_to_write_gets_its_ending_before_the_dialog_asks_about_it(qtbot, 
     dialog.selectFile("mine")
     dialog.accept()
     assert found == [str(tmp_path / "mine.toml")]
+
+
+@pytest.mark.parametrize("ask", [ask_directory, partial(ask_open_file, files="Recipes (*.toml)")])
+def test_a_dialog_opens_at_the_nearest_folder_there_is(qtbot, tmp_path, ask):
+    parent = QWidget()
+    qtbot.addWidget(parent)
+    ask(parent, "Where", str(tmp_path / "campaigns" / "new"), chosen=print)
+    dialog = parent.findChild(QFileDialog)
+    assert Path(dialog.directory().absolutePath()) == tmp_path
+    assert dialog.findChild(QLineEdit).text() == ""
+    dialog.reject()

@@ -148,6 +148,9 @@ def test_a_device_without_the_inputs_of_the_profile_is_refused(qtbot, panel):
     choose(panel, HAPTIC, "sticks")
     press_start(qtbot, panel)
     assert "has none of the inputs of profile 'sticks', left_x, left_y" in panel.message.text()
+    panel.resize(220, 560)  # as narrow as beside the image
+    qtbot.waitUntil(lambda: panel.message.height() > 2 * panel.fontMetrics().lineSpacing())
+    assert panel.message.height() >= panel.message.heightForWidth(panel.message.width())
     assert panel.indicator.words == "off"
 
 

@@ -198,6 +198,13 @@ def test_poses_are_taught_gone_to_and_offered_to_recordings(
     offered = panel.record_bar.pose
     assert [offered.itemText(n) for n in range(offered.count())] == ["no pose", "over the fibre"]
     before = at(panel, mico, "left.x")
+    qtbot.keyClicks(part(box, "poseName", QLineEdit), "over the fibre")
+    box.group.setCurrentText("all axes")
+    click(qtbot, box, "teachPose")
+    assert "There is a pose over the fibre already" in box.message.text()
+    assert len(mico.poses["over the fibre"].positions) == 3
+    click(qtbot, box, "teachPose")
+    assert len(mico.poses["over the fibre"].positions) > 3
     movement = mico["left.x"].move_to(before + 90.0, wait=False)
     qtbot.waitUntil(lambda: movement.done)
     click(qtbot, box, "goPose")
@@ -205,6 +212,30 @@ def test_poses_are_taught_gone_to_and_offered_to_recordings(
     assert at(panel, mico, "left.x") == pytest.approx(before, abs=1.0)
     click(qtbot, box, "removePose")
     assert mico.poses.names == []
+
+
+def test_nothing_is_moved_under_an_operation_that_moves_the_axes(
+    panel: TrajectoryPanel,
+    mico: Mico,
+    qtbot: QtBot,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    before = at(panel, mico, "left.x")
+    mico.poses.teach("here", ["left.x"])
+    mico["left.x"].move_to(before + 20.0)
+    opened(panel, qtbot, tmp_path, HEAD + "left.x by 5 um\n")
+    qtbot.waitUntil(lambda: panel.trajectory is not None)
+    monkeypatch.setattr(mico.application, "busy", lambda: "take with left moves the axes")
+    panel.poses_box.refresh()
+    panel.poses_box.poses.setCurrentText("here")
+    click(qtbot, panel.poses_box, "goPose")
+    assert panel.poses_box.message.text() == "take with left moves the axes"
+    panel.run_bar.run.click()
+    assert panel.report.text() == "take with left moves the axes"
+    qtbot.wait(200)
+    assert at(panel, mico, "left.x") == pytest.approx(before + 20.0, abs=1.0)
+    mico.poses.remove("here")
 
 
 def test_a_rehearsal_is_shown_with_its_own_trajectory_only(

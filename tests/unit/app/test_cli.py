@@ -322,6 +322,14 @@ def test_a_wrong_command_line_is_explained(
     assert "error: " in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("command", ["setup", "serve", "calibrate"])
+def test_a_platform_file_named_before_the_command_is_the_one_that_is_read(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["--config", "/no/such/place", command]) == 1
+    assert complaints(capsys) == ["cosmic: /no/such/place: there is no such file"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "wanted"),
     [

@@ -35,10 +35,10 @@ def test_movements_bear_the_name_of_whoever_commanded_them() -> None:
         assert sources == ["console", "script"]
         sources.clear()
         replay_on(rig.handling, AWAY, Surroundings()).run_here()
-        assert set(sources) == {"script"}
+        assert set(sources) == {"away (script)"}
         sources.clear()
         replay_on(console.handling, BACK, Surroundings()).run_here()
-        assert set(sources) == {"console"}
+        assert set(sources) == {"back (console)"}, "the procedure, and who asked for it"
         forget()
 
 

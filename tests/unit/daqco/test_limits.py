@@ -56,6 +56,17 @@ def test_a_limit_that_is_not_armed_stops_nothing() -> None:
     assert not rig.stops
 
 
+def test_what_is_armed_is_reported_once_with_its_unit() -> None:
+    rig, notes = Rig(), list[str]()
+    rig.guard.unit_of = {"force": "uN"}.__getitem__
+    rig.guard.on_note(lambda channel, text: notes.append(f"{channel}: {text}"))
+    rig.arm()
+    rig.arm()
+    assert notes == ["force: its limit is armed: -100 to 100 uN"]
+    rig.arm(high=90.0)
+    assert notes[1:] == ["force: its limit is armed: -100 to 90 uN"]
+
+
 @pytest.mark.parametrize("volts", [4.0, 1.0, math.nan, math.inf, -math.inf])
 def test_both_sides_and_what_is_no_number_count_as_crossed(volts: float) -> None:
     rig = Rig()

@@ -116,3 +116,11 @@ def test_the_time_left_follows_from_the_room(tmp_path, monkeypatch):
 def test_a_disk_that_is_gone_is_reported(tmp_path):
     with pytest.raises(RecordingError, match="is the disk still there"):
         space_left(tmp_path / "gone", 1.0)
+
+
+def test_a_long_name_leaves_room_for_the_reason() -> None:
+    with pytest.raises(RecordingError) as refused:
+        check_base_name("a/" + "long " * 30)
+    assert str(refused.value).index("cannot be part of") < 40
+    with pytest.raises(RecordingError, match="the name is longer than 200 bytes"):
+        check_base_name("a/" + "long" * 100)

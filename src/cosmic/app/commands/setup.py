@@ -68,7 +68,8 @@ def run(chosen: argparse.Namespace) -> int:
     _, path = load_platform(chosen.config)
     if chosen.write and path.parent.resolve() == shipped_config_dir():
         raise ConfigError(f"{path}: ships with CoSMic; copy it with cosmic init FOLDER first")
-    found, serials = found_axes(path)
+    found, serials, silent = found_axes(path)
+    sys.stdout.write(_without_sensor(silent))
     if not found:
         sys.stdout.write("Every axis that was found is configured.\n")
         return 0
@@ -84,16 +85,43 @@ def run(chosen: argparse.Namespace) -> int:
     return 0
 
 
-def found_axes(path: Path) -> tuple[list[FoundAxis], tuple[Serial, ...]]:
-    """Open the controllers and return the axes that no entry names, and all serial numbers."""
+def _without_sensor(silent: Sequence[tuple[int, int]]) -> str:
+    """Say at which channels an axis without sensor may be, and how it is written down."""
+    if not silent:
+        return ""
+    listed = ", ".join(f"device {device} channel {channel}" for device, channel in silent)
+    device, channel = silent[0]
+    return (
+        f"No sensor answers at {listed}. Whether anything is connected there, such as a gripper "
+        "without sensor, nobody can ask: write it into the platform file by hand, as\n\n"
+        f'[[mico.positioner]]\nname = "gripper"\ndevice = {device}\nchannel = {channel}\n'
+        'kind = "open-loop"\n\n'
+    )
+
+
+def found_axes(
+    path: Path,
+) -> tuple[list[FoundAxis], tuple[Serial, ...], list[tuple[int, int]]]:
+    """Open the controllers and look what no entry names.
+
+    Returns
+    -------
+    tuple
+        The axes with a sensor, the serial numbers of all devices, and device and channel where
+        no sensor answers.
+    """
     file, _ = load_platform(path)
     with connect(path, applications=("mico",)) as rig:
         found = unnamed_axes(rig.mico, file.mico.kinds)
         application = rig.mico.application
         if not isinstance(application, MicoApplication):
             raise NotAvailable("axes are set up at the station that has them")
-        serials = application.manager.controller.find_devices()
-    return found, serials
+        controller, devices = application.manager.controller, application.manager.devices
+        serials = controller.find_devices()
+    taken = {(each.device, each.channel) for each in found}
+    taken |= {(each.device, each.channel) for each in file.mico.positioner}
+    places = [(d, c) for d in sorted(devices) for c in range(controller.capabilities.channels)]
+    return found, serials, [place for place in places if place not in taken]
 
 
 def unnamed_axes(mico: Mico, configured: Container[str]) -> list[FoundAxis]:

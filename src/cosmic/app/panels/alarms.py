@@ -123,7 +123,7 @@ class AlarmPanel(QWidget):
 
     def __init__(self, book: AlarmBook, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._book = book
+        self._book, self._shown = book, tuple[Alarm, ...]()
         self.list = named(QTreeWidget(), "alarmList")
         self.list.setHeaderLabels(list(HEADS))
         self.list.setRootIsDecorated(False)
@@ -145,8 +145,10 @@ class AlarmPanel(QWidget):
         self.refresh()
 
     def refresh(self) -> None:
-        """Show the alarms there are now."""
+        """Show the alarms there are now; the chosen one stays chosen."""
+        chosen = self._chosen
         self.list.clear()
+        self._shown = self._book.alarms
         for each in self._book.alarms:
             state = State.ERROR if each.level is Level.CRITICAL else State.REFUSED
             word = f"{state_look(state).glyph} {each.level}" + ("" if each.lasts else ", over")
@@ -158,15 +160,23 @@ class AlarmPanel(QWidget):
             if each.seen:
                 item.setFlags(item.flags() & ~Qt.ItemFlag.ItemIsEnabled)
             self.list.addTopLevelItem(item)
+            if chosen is not None and (each.source, each.when) == (chosen.source, chosen.when):
+                self.list.setCurrentItem(item)
         for column, width in enumerate((9, 14, 46, 46, 6)):
             self.list.setColumnWidth(column, width * STEP_PX)
         self.one.setEnabled(bool(self._book.unseen))
         self.all.setEnabled(bool(self._book.unseen))
 
-    def _on_one(self) -> None:
+    @property
+    def _chosen(self) -> Alarm | None:
+        """The alarm whose line is chosen."""
         item: QTreeWidgetItem | None = self.list.currentItem()
-        chosen = self.list.indexOfTopLevelItem(item) if item is not None else -1
-        unseen = [i for i, each in enumerate(self._book.alarms) if not each.seen]
-        index = chosen if chosen in unseen else next(iter(unseen), -1)
-        if index >= 0:
-            self._book.acknowledge(index)
+        row = self.list.indexOfTopLevelItem(item) if item is not None else -1
+        return self._shown[row] if 0 <= row < len(self._shown) else None
+
+    def _on_one(self) -> None:
+        """Acknowledge the chosen one; the newest where none is chosen that nobody has seen."""
+        chosen, unseen = self._chosen, self._book.unseen
+        if unseen:
+            one = chosen if chosen in unseen else unseen[0]
+            self._book.acknowledge(self._book.alarms.index(one))

@@ -7,7 +7,6 @@ from typing import Final
 from PySide6.QtCore import QSettings, Qt, QTimer
 from PySide6.QtWidgets import (
     QFrame,
-    QLabel,
     QPushButton,
     QScrollArea,
     QSizePolicy,
@@ -15,7 +14,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from cosmic.frame.gui.build import named, push_button, styled, tight_row
+from cosmic.frame.gui.build import named, push_button, styled, tight_row, wrapped_label
 from cosmic.frame.gui.key_focus import set_shown
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.units import with_micro_signs
@@ -73,9 +72,7 @@ class Coach(QFrame):
         self.off.setChecked(str(settings.value(_KEY, "")).lower() == "true")
         self.off.clicked.connect(self._on_off)
         self._name_off()
-        self.words = named(QLabel(), "coachWords")
-        self.words.setWordWrap(True)
-        self.words.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
+        self.words = named(wrapped_label(), "coachWords")
         line_px = self.words.fontMetrics().lineSpacing()
         # Long words scroll by themselves in a low panel: the button below them is always seen.
         room = named(QScrollArea(), "coachRoom")

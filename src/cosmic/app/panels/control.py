@@ -1,6 +1,7 @@
 """The panel "Control": choose what to hold and by which axis, start, watch, stop."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -26,7 +27,7 @@ from cosmic.autonomy.control.pid import PidGains
 from cosmic.autonomy.control.trace import ControlTrace
 from cosmic.daqco.gui.plot.units import display_unit
 from cosmic.daqco.gui.value_field import ValueField
-from cosmic.frame.errors import CosmicError
+from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.elided_label import ElidedLabel
@@ -206,11 +207,16 @@ class ControlPanel(QWidget):
     ----------
     control : Control
         Whose loops they are.
+    busy : callable
+        Says why nothing is moved by hand now; empty where nothing speaks against it.
     """
 
-    def __init__(self, control: Control, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, control: Control, parent: QWidget | None = None, *, busy: Callable[[], str] = str
+    ) -> None:
         super().__init__(parent)
         self.setObjectName("ControlPanel")
+        self._busy = busy
         self._control = control
         self._mine: ControlHandle | None = None
         self._shown: ControlHandle | None = None
@@ -264,6 +270,8 @@ class ControlPanel(QWidget):
         if asked is None:
             return
         try:
+            if why := self._busy():
+                raise NotAvailable(why)
             self._mine = self._control.hold_force(
                 asked.channel,
                 asked.axis,
@@ -348,9 +356,11 @@ class ControlPanel(QWidget):
             self._mine.stop()
 
 
-def make_control_panel(rig: Rig | Control, parent: QWidget | None = None) -> ControlPanel:
+def make_control_panel(
+    rig: Rig | Control, parent: QWidget | None = None, *, busy: Callable[[], str] = str
+) -> ControlPanel:
     """Return the panel for the loops of a rig."""
-    return ControlPanel(rig.control if isinstance(rig, Rig) else rig, parent)
+    return ControlPanel(rig.control if isinstance(rig, Rig) else rig, parent, busy=busy)
 
 
 def _look(handle: ControlHandle) -> State:

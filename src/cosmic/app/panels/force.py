@@ -41,6 +41,7 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.file_names import NameOption
 from cosmic.frame.gui.amounts import clock_text
+from cosmic.frame.gui.beside import open_beside
 from cosmic.frame.gui.build import click_once, named, push_button, styled, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.relay import Relay
@@ -476,7 +477,7 @@ class ForcePanel(QWidget):
     def _on_limit(self) -> None:
         dialog = LimitDialog(self._daqco, self._channel, self)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.open()
+        open_beside(dialog)
 
     def _on_calibrate(self) -> None:
         if self._daqco.remote:
@@ -484,7 +485,7 @@ class ForcePanel(QWidget):
             return
         dialog = ForceCalibrationDialog(self._daqco, self._channel, self)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.open()
+        open_beside(dialog)
 
     def take_zero(self) -> None:
         """Call the present force zero, by another scale; refused while the sensor is loaded."""

@@ -311,6 +311,8 @@ class PathController(QObject):
             self.plan(request)
             return
         try:
+            if why := self._mico.application.busy():
+                raise NotAvailable(why)
             task = self._application.follow_path(path, self._mico.source)
         except NotAvailable as exc:
             self._preview.set_words(f"Not yet: {exc}. Then press Go again.")

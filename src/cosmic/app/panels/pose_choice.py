@@ -20,6 +20,9 @@ class PoseChoice(QComboBox):
         self._pictures: PosePictures | None = None
         named(tipped(self, "Named poses"), "toolPoses")
         self.setPlaceholderText("no pose yet")
+        # Only in the list: beside the name of the chosen one there is no room.
+        self.setIconSize(QSize(0, 0))
+        self.view().setIconSize(SIZE)
         self.setMinimumWidth(7 * STEP_PX)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
@@ -36,15 +39,8 @@ class PoseChoice(QComboBox):
     @override
     def showPopup(self) -> None:
         self._draw()
-        # Only in the list: beside the name of the chosen one there is no room.
-        self.setIconSize(SIZE)
         self.view().setMinimumWidth(SIZE.width() + 16 * STEP_PX)
         super().showPopup()
-
-    @override
-    def hidePopup(self) -> None:
-        super().hidePopup()
-        self.setIconSize(QSize(0, 0))
 
     def _draw(self) -> None:
         model = self._mico.application.scene

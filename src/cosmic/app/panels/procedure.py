@@ -155,7 +155,19 @@ class ProcedureTreePanel(QWidget):
     go_on : callable or None
         Returns a run that goes on where the one that is shown ended early; called when Resume is
         pressed then.
+
+    Signals
+    -------
+    refused()
+        What a button asked for cannot be; the reason stands in the panel.
+
+    Attributes
+    ----------
+    buttons : QWidget
+        Start, pause and the others, below the tree; another panel may have them elsewhere.
     """
+
+    refused = Signal()
 
     def __init__(
         self,
@@ -207,8 +219,8 @@ class ProcedureTreePanel(QWidget):
         head.addWidget(self.indicator)
         head.addWidget(self.state)
         head.addWidget(self.title, 1)
-        buttons = QWidget()
-        flow = FlowLayout(STEP_PX, buttons)
+        self.buttons = QWidget()
+        flow = FlowLayout(STEP_PX, self.buttons)
         for button in (self.start, self.pause, self.step, self.resume, self.abort):
             flow.addWidget(button)
         column = QVBoxLayout(self)
@@ -217,7 +229,7 @@ class ProcedureTreePanel(QWidget):
         column.addLayout(head)
         column.addWidget(self.reason)
         column.addWidget(self.tree, 1)
-        column.addWidget(buttons)
+        column.addWidget(self.buttons)
 
     def _connect(self) -> None:
         self.start.clicked.connect(self._on_start)
@@ -296,14 +308,18 @@ class ProcedureTreePanel(QWidget):
             self.indicator.set_state(State.REFUSED)
             self.state.setText("refused")
             self.reason.set_text(str(exc))
+            self.refused.emit()
             return
         self.refresh()
 
     # Showing
 
     def _on_changed(self) -> None:
-        if self.isVisible() and not self._redraw.isActive():
+        if self._is_seen() and not self._redraw.isActive():
             self._redraw.start()
+
+    def _is_seen(self) -> bool:
+        return self.isVisible() or self.buttons.isVisible()
 
     def refresh(self) -> None:
         """Show the run as it is now."""
@@ -348,7 +364,8 @@ class ProcedureTreePanel(QWidget):
     @override
     def hideEvent(self, event: QHideEvent) -> None:
         super().hideEvent(event)
-        self._redraw.stop()
+        if not self._is_seen():
+            self._redraw.stop()
         self._tick.stop()
 
     @override

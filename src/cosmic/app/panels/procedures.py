@@ -41,7 +41,7 @@ class ProcedurePanels:
         self._scene = scene
         self._trajectories = LatePanel(self._make_trajectories)
         self._teleoperation = LatePanel(lambda: make_teleoperation_panel(gui.mico))
-        self._control = LatePanel(lambda: make_control_panel(control))
+        self._control = LatePanel(lambda: make_control_panel(control, busy=lambda: gui.busy))
         panels: dict[str, QWidget] = {
             TRAJECTORIES: self._trajectories,
             TELEOPERATION: self._teleoperation,

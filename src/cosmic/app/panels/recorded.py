@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
     QDialogButtonBox,
-    QFileDialog,
     QFormLayout,
     QGridLayout,
     QLineEdit,
@@ -24,7 +23,8 @@ from PySide6.QtWidgets import (
 from cosmic.daqco.gui.value_field import ValueField
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.file_names import name_problem
-from cosmic.frame.gui.ask_directory import ask_save_file
+from cosmic.frame.gui.ask_directory import ask_open_file, ask_save_file
+from cosmic.frame.gui.beside import open_beside
 from cosmic.frame.gui.build import named, push_button, styled, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
@@ -369,9 +369,13 @@ class RecorderPanel(QWidget):
         self.say(f"written: {path} and {path.with_suffix('.py').name}")
 
     def _on_open(self) -> None:
-        path, _ = QFileDialog.getOpenFileName(self, "Open a procedure", str(self._folder()), _FILES)
-        if path:
-            self.open_file(Path(path))
+        ask_open_file(
+            self,
+            "Open a procedure",
+            str(self._folder()),
+            files=_FILES,
+            chosen=lambda path: self.open_file(Path(path)),
+        )
 
     def open_file(self, path: Path) -> None:
         """Show what was saved."""
@@ -398,7 +402,7 @@ class RecorderPanel(QWidget):
     def _asking(self, title: str, asked: dict[tuple[int, str], tuple[str, float]]) -> ValuesDialog:
         dialog = ValuesDialog(title, asked, self)
         dialog.finished.connect(dialog.deleteLater)
-        dialog.show()  # not modal: STOP can be clicked
+        open_beside(dialog)
         return dialog
 
     def _on_values(

@@ -150,6 +150,7 @@ class ToolPanel(QWidget):
         self._steps: dict[str, float] = {}
         self._stopped = ""
         self._verdict: MoveVerdict | None = None
+        self._replaced = ""  # the pose that was said to be there already
         self._last: tuple[str, Callable[[], None]] | None = None
         self._shown: Shown = USUAL
         self._detour_by_click: Callable[[], None] | None = None
@@ -206,6 +207,7 @@ class ToolPanel(QWidget):
         self._make_exits()
         self.line = named(QLabel(), "toolLine")
         self.line.setWordWrap(True)
+        self.line.setTextFormat(Qt.TextFormat.PlainText)
         self.line.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.line.setMinimumHeight(4 * STEP_PX)
         self.line.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
@@ -525,16 +527,22 @@ class ToolPanel(QWidget):
             self._refuse(progress.error)
 
     def _on_keep(self) -> None:
+        self._replaced = ""
         self.pose_name.setVisible(not self.pose_name.isVisible())
         self.pose_name.setFocus()
 
     def _on_pose_named(self) -> None:
         name = self.pose_name.text().strip()
+        if name in self._mico.poses.names and name != self._replaced:
+            self._replaced = name
+            self._refuse(f"There is a pose {name} already: Enter again replaces it")
+            return
         try:
             self._mico.poses.teach(name, list(self.axes))
         except CosmicError as exc:
             self._refuse(str(exc))
             return
+        self._replaced = ""
         self.pose_name.clear()
         self.pose_name.hide()
         self.refresh_poses()

@@ -484,10 +484,11 @@ class TaskLayout(QObject):
             if not each.crossed:
                 book.end(f"limit {name}")
                 continue
-            value = f" at {each.value:.0f}" if each.value is not None else ""
+            unit = daqco.units.get(name, "")
+            value = f" at {each.value:.4g} {unit}" if each.value is not None else ""
             advice = "Move the tool off, reset the stop, then reset the limit"
             book.raise_alarm(
-                f"limit {name}", Level.CRITICAL, f"{name} crossed its limit{value}", advice
+                f"limit {name}", Level.CRITICAL, f"{name} crossed its limit{value}".rstrip(), advice
             )
         if daqco.problem:
             advice = "Check the board, then start the acquisition"

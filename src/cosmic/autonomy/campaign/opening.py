@@ -128,6 +128,7 @@ def open_campaign(recipe: Recipe, folder: Path, host: CampaignHost) -> Campaign:
     with ExitStack() as undo:
         work = HandlingContext.on(host.rig, settings)
         undo.callback(work.close)
+        work.command_as("campaign", host.rig.mico)
         store, known = _store(recipe, folder, host, work.clock.now_s())
         undo.callback(store.close)
         record = write_provenance(folder, store.run, host.provenance, recipe.text)

@@ -24,7 +24,7 @@ from cosmic.autonomy.tools import axis_targets
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
-from cosmic.mico.api.mico import Mico
+from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.vico import Vico
 from cosmic.vico.core.image import CameraImage
@@ -255,6 +255,10 @@ class HandlingContext:
             work.calibration.registry = positions.registry
         forces.open()
         return work
+
+    def command_as(self, name: str, mico: Mico) -> None:
+        """Have axes move by the name of what runs, and of who asked for it: the log says both."""
+        self.mico = mico_of(mico.application, f"{name} ({mico.source})")
 
     def close(self) -> None:
         """Let go of the force channel."""

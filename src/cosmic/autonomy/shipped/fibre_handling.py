@@ -352,7 +352,6 @@ class FibreHandling:
             taking = request.operation is SingleOperation.TAKE
             own = taking or request.operation is SingleOperation.CLOSE
             work = self.context(request.gripper if own else self._state.gripper)
-            work.mico = self._rig.mico
             push, closing = PushToForce(request.force_un), CloseGently()
             procedure = self._procedure(request, work, push, closing)
             if taking:
@@ -396,7 +395,6 @@ class FibreHandling:
             if self.fibre is not None and gripper != self._state.gripper:
                 raise NotAvailable(f"{self._state.gripper} holds a fibre; put it away first")
             work = self.context(gripper)
-            work.mico = self._rig.mico
             work.shared.surveyed = False
             self._state.gripper, self._state.request = gripper, None
             return self._made(
@@ -410,6 +408,7 @@ class FibreHandling:
         on_end: Callable[[ProcedureRun[HandlingContext]], None],
     ) -> ProcedureRun[HandlingContext]:
         """Return a run that is followed to its end."""
+        work.command_as(procedure.name, self._rig.mico)
         run = self._state.run = self._make_run(procedure, work)
         done = False
 

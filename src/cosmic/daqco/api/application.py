@@ -12,7 +12,7 @@ from typing_extensions import override
 
 from cosmic.daqco.api.recorder import Recorder
 from cosmic.daqco.core.chunk import DataChunk
-from cosmic.daqco.core.guarded import check_arming, check_guarded, successor
+from cosmic.daqco.core.guarded import check_arming, check_guarded, successor, unit_of
 from cosmic.daqco.core.left_behind import OpenRecordings
 from cosmic.daqco.core.limits import Limit, LimitGuard
 from cosmic.daqco.core.output_control import OutputControl
@@ -156,6 +156,7 @@ class DaqcoApplication(TaskApplication):
         self.buffer = UDaqBuffer()
         self.guard = LimitGuard(clock)
         self.guard.check = self._check_arming
+        self.guard.unit_of = lambda channel: unit_of(channel, self._settings)
         self._policy = policy
         self._settings = settings
         self._lock = RLock()

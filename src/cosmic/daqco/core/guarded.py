@@ -85,6 +85,12 @@ def measurable(name: str, settings: DaqcoSettings) -> tuple[float, float]:
     return float(values.min()), float(values.max())
 
 
+def unit_of(name: str, settings: DaqcoSettings) -> str:
+    """Return the unit that a channel is measured in; empty where there is no such channel."""
+    channel = _channel(name, settings)
+    return "" if channel is None else _scale(channel, settings).unit
+
+
 def changed_quantity(name: str, before: DaqcoSettings, after: DaqcoSettings) -> str:
     """Return what changed of the quantity that an active channel measures, in words; or ""."""
     old, new = _channel(name, before), _channel(name, after)
@@ -122,7 +128,8 @@ def check_guarded(limit: Limit, before: DaqcoSettings, after: DaqcoSettings) -> 
     what = _touched(old, before, after) or _slowed(before, after)
     if what:
         raise NotAvailable(
-            f"{limit.channel}: {what} while its limit ({limit.range_text}) is armed. Disarm the "
+            f"{limit.channel}: {what} while its limit ({limit.range_text} "
+            f"{_scale(old, before).unit}) is armed. Disarm the "
             f"limit first, then set it anew"
         )
 

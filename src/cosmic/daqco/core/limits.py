@@ -101,12 +101,15 @@ class LimitGuard:
     ----------
     check : callable
         Called with a limit before it is armed; what it raises forbids that.
+    unit_of : callable
+        Returns the unit of a channel, for what is reported.
     """
 
     def __init__(self, clock: Clock, trip: Callable[[str], None] | None = None) -> None:
         self._clock = clock
         self.trip = trip
         self.check: Callable[[Limit], None] = lambda _limit: None
+        self.unit_of: Callable[[str], str] = lambda _channel: ""
         self._lock = Lock()
         self._publishing = RLock()
         self._limits: dict[str, Limit] = {}
@@ -208,7 +211,7 @@ class LimitGuard:
                 self._limits[limit.channel] = replace(limit, armed=False, suspended=False)
             self._publish_note(limit.channel, f"its limit is disarmed: {exc}")
         else:
-            self._publish_note(limit.channel, f"its limit is armed: {limit.range_text}")
+            self._publish_armed(limit)
 
     def set_limit(self, limit: Limit) -> None:
         """Set the limit of a channel, armed or not.
@@ -231,9 +234,9 @@ class LimitGuard:
                 )
             before = self._limits.get(limit.channel)
             self._put(replace(limit, tripped=False, beyond=False))
-        if limit.armed:
-            self._publish_note(limit.channel, f"its limit is armed: {limit.range_text}")
-        elif before is not None and (before.armed or before.suspended):
+        if limit.armed and limit != before:
+            self._publish_armed(limit)
+        if not limit.armed and before is not None and (before.armed or before.suspended):
             self._publish_note(limit.channel, "its limit was disarmed")
 
     def set_suspended(self, limit: Limit) -> None:
@@ -289,6 +292,10 @@ class LimitGuard:
             limit = self._limits.pop(channel, None)
             if limit is not None:
                 self._put(replace(limit, channel=name))
+
+    def _publish_armed(self, limit: Limit) -> None:
+        text = f"its limit is armed: {limit.range_text} {self.unit_of(limit.channel)}"
+        self._publish_note(limit.channel, text.rstrip())
 
     def _publish_note(self, channel: str, text: str) -> None:
         logger.warning("%s: %s", channel, text)

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from cosmic.daqco.core.settings import EXTREMES_V, ChannelSettings
 from cosmic.daqco.gui.colours import colour_name, readable, swatch
+from cosmic.frame.gui.beside import open_beside
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.palette import OKABE_ITO
 from cosmic.frame.gui.quantity_field import QuantityField
@@ -190,4 +191,4 @@ class ChannelForm(QWidget):
         dialog.colorSelected.connect(lambda colour: self._show_colour(colour.name().upper()))
         dialog.finished.connect(lambda: self._show_colour(self.colour_shown.property("colour")))
         dialog.finished.connect(dialog.deleteLater)
-        dialog.open()
+        open_beside(dialog)

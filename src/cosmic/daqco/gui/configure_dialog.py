@@ -25,6 +25,7 @@ from cosmic.daqco.gui.dialog import FieldDialog, button_box
 from cosmic.daqco.gui.draft import Draft
 from cosmic.daqco.gui.scale_editor import ScaleEditor, ScaleView
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.beside import open_beside
 from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.quantity_field import QuantityField
@@ -214,7 +215,7 @@ class UDaqConfigureDialog(FieldDialog):
     def _on_view(self, name: str) -> None:
         view = ScaleView(self._draft.scale(name), self)
         view.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        view.open()
+        open_beside(view)
 
     def _on_edit(self, name: str) -> None:
         if not self._take_form():
@@ -222,7 +223,7 @@ class UDaqConfigureDialog(FieldDialog):
         editor = ScaleEditor(self._draft.scales, self._draft.scale_users(), self, chosen=name)
         editor.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         editor.scales_accepted.connect(self._on_scales_accepted)
-        editor.open()
+        open_beside(editor)
 
     def _on_scales_accepted(self, scales: object, renamed: object) -> None:
         assert isinstance(scales, tuple)

@@ -27,6 +27,7 @@ from cosmic.frame.errors import CosmicError
 from cosmic.frame.file_names import NameOption, name_problem
 from cosmic.frame.gui.amounts import duration_text, size_text
 from cosmic.frame.gui.ask_directory import ask_directory
+from cosmic.frame.gui.beside import open_beside
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.overwrite_question import overwrite_question
@@ -363,7 +364,7 @@ class UDaqFileWidget(QWidget):
         box = overwrite_question(self, path, lambda: self._record(path, overwrite=True), size_bytes)
         box.finished.connect(self._on_answered)
         self._question = box
-        box.open()
+        open_beside(box)
         self.refresh()
 
     def _on_answered(self) -> None:

@@ -26,6 +26,7 @@ from cosmic.daqco.gui.outputs_panel import OutputsPanel
 from cosmic.daqco.gui.plotter import UDaqPlotter
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.beside import open_beside
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.relay import Relay
@@ -194,7 +195,7 @@ class UDaqMainWidget(QWidget):
 
     def _open(self, dialog: QDialog) -> None:
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.open()
+        open_beside(dialog)
 
     # Export
 

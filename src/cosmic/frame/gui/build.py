@@ -2,8 +2,15 @@
 
 from typing import TypeVar
 
-from PySide6.QtCore import QEvent, QObject
-from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QPushButton, QWidget
+from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QSizePolicy,
+    QWidget,
+)
 
 from cosmic.frame.overrides import override
 
@@ -73,6 +80,21 @@ def click_once(button: B) -> B:
     """
     button.installEventFilter(_SecondClick(button))
     return button
+
+
+def wrapped_label() -> QLabel:
+    """Return a label for words as they are, in as many lines as they need.
+
+    It takes the width there is: one long word, such as a path, cuts no other off.
+    """
+    label = QLabel()
+    label.setTextFormat(Qt.TextFormat.PlainText)
+    label.setWordWrap(True)
+    label.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
+    policy = label.sizePolicy()
+    policy.setHorizontalPolicy(QSizePolicy.Policy.Ignored)
+    label.setSizePolicy(policy)
+    return label
 
 
 def tight_row(spacing_px: int) -> tuple[QWidget, QHBoxLayout]:

@@ -137,4 +137,6 @@ class Drawer(QWidget):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is self._window and event.type() == QEvent.Type.Resize:
             self._lay_over()
+        elif watched is self._window and event.type() == QEvent.Type.LayoutRequest:
+            self._body.raise_()  # panels that come, as with another workspace, come above it
         return super().eventFilter(watched, event)

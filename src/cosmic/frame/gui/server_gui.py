@@ -27,6 +27,7 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.frame.gui.application_events import at_one_go
+from cosmic.frame.gui.beside import open_beside
 from cosmic.frame.gui.dock import PanelDock
 from cosmic.frame.gui.drawer import Drawer
 from cosmic.frame.gui.keys_dialog import KeyList, KeysDialog
@@ -81,7 +82,7 @@ class LayoutMenu(QObject):
         dialog.setWindowTitle("Keep the layout")
         dialog.setLabelText("Name of the layout")
         dialog.textValueSelected.connect(self._on_named)
-        dialog.open()
+        open_beside(dialog)
 
     def _on_named(self, name: str) -> None:
         name = name.strip().replace("/", "-")
@@ -171,7 +172,7 @@ class ServerMenus(QObject):
             self._window,
         )
         box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        box.open()
+        open_beside(box)
 
 
 Area = Qt.DockWidgetArea

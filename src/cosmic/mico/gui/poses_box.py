@@ -6,7 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QLineEdit, QVBoxLayout, QWidget
 
-from cosmic.frame.errors import CosmicError
+from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.relay import Relay
@@ -48,6 +48,7 @@ class PosesBox(QWidget):
         self.group.addItems([ALL, *(each.title for each in self._settings_groups())])
         self.teach = named(push_button("Teach", "Keep the positions of the axes now"), "teachPose")
         self.message = ElidedLabel()
+        self._replaced = ""  # the pose that was said to be there already
         self._arrange()
         self.go.clicked.connect(lambda: self._go(around=False))
         self.around.clicked.connect(lambda: self._go(around=True))
@@ -95,6 +96,11 @@ class PosesBox(QWidget):
     def _on_teach(self) -> None:
         name, group = self.name.text().strip(), self.group.currentText()
         poses, axes = self._mico.poses, None if group == ALL else group
+        if name in poses.names and name != self._replaced:
+            self._replaced = name
+            self.message.set_text(f"There is a pose {name} already: Teach again replaces it")
+            return
+        self._replaced = ""
         self._mico.carry_out(lambda: poses.teach(name, axes), self._taught)
 
     def _on_taught(self, pose: Pose | None, error: CosmicError | None) -> None:
@@ -122,6 +128,8 @@ class PosesBox(QWidget):
     def _go(self, *, around: bool) -> None:
         """Begin to go; how it ends is shown by the window's task bar."""
         try:
+            if why := self._mico.application.busy():
+                raise NotAvailable(why)
             task = self._mico.poses.go(self.poses.currentText(), detour=around, wait=False)
         except CosmicError as exc:
             self.message.set_text(str(exc))

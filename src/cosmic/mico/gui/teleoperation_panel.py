@@ -16,12 +16,13 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.frame.errors import CosmicError
-from cosmic.frame.gui.build import named, push_button
+from cosmic.frame.gui.build import named, push_button, wrapped_label
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.key_hold import HoldKeys
 from cosmic.frame.gui.late_panel import is_seen
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.overrides import override
+from cosmic.frame.units import with_micro_signs
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.teleoperation.settings import TeleoperationProfileSettings
 from cosmic.mico.core.teleoperation.state import TeleoperationPhase, TeleoperationState
@@ -177,7 +178,7 @@ class TeleoperationPanel(QWidget):
         self.table = MappingTable({each.name: each.kind for each in settings.positioner})
         self.fine = FineRow()
         self.fine_share = self.fine.share
-        self.message = ElidedLabel()
+        self.message = named(wrapped_label(), "teleoperationMessage")
         self.keys = SteeringKeys(self._app, self._teleoperation.sources.keys.keyboard, self)
         self._words = self._missing = ""
         self._arrange()
@@ -391,7 +392,9 @@ class TeleoperationPanel(QWidget):
         self._on_profile_chosen()
 
     def _say(self, text: str) -> None:
-        self.message.set_text(f"{state_look(State.REFUSED).glyph} {text}")
+        shown = with_micro_signs(f"{state_look(State.REFUSED).glyph} {text}")
+        self.message.setText(shown)
+        self.message.setToolTip(shown)
         self.message.show()
 
     # Coming and going

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QFileDialog, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from cosmic.frame.errors import CosmicError
-from cosmic.frame.gui.ask_directory import ask_save_file
+from cosmic.frame.gui.ask_directory import ask_open_file, ask_save_file
 from cosmic.frame.gui.build import named, push_button, tight_row
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
@@ -134,9 +134,9 @@ class TrajectoryPanel(QWidget):
     # Opening
 
     def _on_open(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self, "Open a trajectory", "", FILTER)
-        if name:
-            self.open(Path(name))
+        ask_open_file(
+            self, "Open a trajectory", "", files=FILTER, chosen=lambda name: self.open(Path(name))
+        )
 
     def open(self, path: Path) -> None:
         """Read a file in the application's thread; what is wrong with it is shown."""

@@ -102,6 +102,9 @@ class PlayControl(QObject):
     def _try_start(self, start: StartMode) -> None:
         if self._asked is not None:
             self._question.hide()
+            if why := self._mico.application.busy():
+                self.refused.emit(why)
+                return
             asked = self._asked
             self._mico.carry_out(lambda: asked(start), self._begun)
 

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.beside import open_beside
 from cosmic.frame.gui.build import named, tipped
 from cosmic.frame.overrides import override
 from cosmic.vico.api.coordinate_transform import Pixel
@@ -237,7 +238,7 @@ class FibreEditor(QWidget):
             box.setStandardButtons(buttons.Save | buttons.Discard | buttons.Cancel)
             box.finished.connect(self._on_answered)
             self.question = box
-            box.open()
+            open_beside(box)
 
     def _on_answered(self, answer: int) -> None:
         self.question = None

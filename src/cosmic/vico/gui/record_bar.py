@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.amounts import duration_text, size_text
+from cosmic.frame.gui.beside import open_beside
 from cosmic.frame.gui.build import named, push_button, styled, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.overwrite_question import overwrite_question
@@ -268,7 +269,7 @@ class RecordBar(QWidget):
     def _unless_there(self, path: Path, act: Callable[[bool], object]) -> None:
         """Do it, after a question where it would overwrite something."""
         if not self._camera.remote and path.exists():
-            overwrite_question(self, path, lambda: self._try(lambda: act(True))).open()
+            open_beside(overwrite_question(self, path, lambda: self._try(lambda: act(True))))
             self.refresh()
         else:
             self._try(lambda: self._into_new(act))
@@ -304,7 +305,7 @@ class RecordBar(QWidget):
     def _on_lapse(self) -> None:
         dialog = TimeLapseDialog(self)
         dialog.agreed.connect(self.begin_lapse)
-        dialog.open()
+        open_beside(dialog)
 
     def begin_lapse(self, interval_s: float, count: int) -> None:
         """Record `count` images, one each `interval_s`."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QTimer, Signal
-from PySide6.QtWidgets import QComboBox, QFileDialog, QLineEdit, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QLineEdit, QTabWidget, QVBoxLayout, QWidget
 
 from cosmic.app.panels.campaign.board import CampaignBoard
 from cosmic.app.panels.campaign.fibre_card import FibreCard
@@ -23,7 +23,7 @@ from cosmic.autonomy.procedures.run import RunState
 from cosmic.autonomy.procedures.tree import NodeView, ProcedureTreeState
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.gui.ask_directory import ask_directory
+from cosmic.frame.gui.ask_directory import ask_directory, ask_open_file
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
@@ -163,6 +163,7 @@ class CampaignPanel(QWidget):
         self._writing: JobQueue | None = None
         self._campaign: Campaign | None = None
         self._card: FibreRecord | None = None
+        self._recipe = _FIRST
         self._changed_relay = Relay(self._on_changed)
         self._written_relay = Relay(self._on_written)
         self._make_widgets()
@@ -204,13 +205,14 @@ class CampaignPanel(QWidget):
         self.tabs.addTab(FittedPanel(self.board), "Fibres")
         self.tabs.addTab(FittedPanel(self.card), "Fibre")
         whole = QVBoxLayout(self)
-        whole.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, 0)
+        whole.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
         whole.setSpacing(STEP_PX)
         whole.addWidget(head)
         whole.addWidget(self.about)
         whole.addWidget(self.folder)
         whole.addWidget(self.message)
         whole.addWidget(self.tabs, 1)
+        whole.addWidget(self.procedure.buttons)  # whichever page is in front
         self.message.hide()
 
     def _connect(self) -> None:
@@ -218,6 +220,7 @@ class CampaignPanel(QWidget):
         self.choose.clicked.connect(self._on_choose)
         self.report.clicked.connect(self.write_report)
         self.plate.clicked.connect(self.confirm_plate)
+        self.procedure.refused.connect(lambda: self.tabs.setCurrentWidget(self.procedure))
         self.card.replay_requested.connect(self._on_replay)
         self.board.fibre_chosen.connect(self.show_fibre)
 
@@ -230,11 +233,10 @@ class CampaignPanel(QWidget):
 
     def _on_recipe(self) -> None:
         if self.recipe.currentText() == OTHER:
-            self.recipe.setCurrentIndex(0)
-            dialog = QFileDialog(self, "Recipe", str(self._home), "Recipes (*.toml)")
-            dialog.fileSelected.connect(self.use_recipe)
-            dialog.finished.connect(dialog.deleteLater)
-            dialog.open()
+            self.recipe.setCurrentText(self._recipe)  # nothing else is chosen by a cancel
+            ask_open_file(
+                self, "Recipe", str(self._home), files="Recipes (*.toml)", chosen=self.use_recipe
+            )
             return
         self._suggest_folder()
 
@@ -246,6 +248,7 @@ class CampaignPanel(QWidget):
         self._suggest_folder()
 
     def _suggest_folder(self) -> None:
+        self._recipe = self.recipe.currentText()
         self._show_about()
         name = Path(self.recipe.currentText()).stem
         self.folder.setText(str(self._home / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"))

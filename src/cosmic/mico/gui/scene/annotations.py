@@ -39,6 +39,20 @@ def draw_annotations(
         _draw_contact(painter, content.refused, project, palette)
 
 
+def draw_measured(
+    painter: QPainter,
+    content: SceneContent,
+    project: Project,
+    axes: Floats,
+    px_mm: float,
+    palette: Palette,
+) -> None:
+    """Draw the directions and the scale, then what has a place: no veil lies over its number."""
+    draw_axes(painter, axes, palette)
+    draw_scale(painter, px_mm, palette)
+    draw_annotations(painter, content, project, palette)
+
+
 def _draw_tracks(
     painter: QPainter, tracks: Tracks, project: Project, colour: QColor, *, dashed: bool
 ) -> None:

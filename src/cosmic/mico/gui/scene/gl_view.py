@@ -12,12 +12,7 @@ from cosmic.frame.errors import NotAvailable
 from cosmic.frame.gui.painting import painting
 from cosmic.frame.overrides import override
 from cosmic.mico.core.collision.model import Floats
-from cosmic.mico.gui.scene.annotations import (
-    draw_annotations,
-    draw_axes,
-    draw_legend,
-    draw_scale,
-)
+from cosmic.mico.gui.scene.annotations import draw_legend, draw_measured
 from cosmic.mico.gui.scene.camera import Camera, Sight
 from cosmic.mico.gui.scene.content import SceneContent
 from cosmic.mico.gui.scene.gl_context import GLContext
@@ -92,9 +87,8 @@ class GLSceneView(SceneView):
         palette = self.theme()
         with painting(self) as painter:
             painter.drawImage(0, 0, self._image)
-            draw_annotations(painter, self.content, self._project, palette)
-            draw_axes(painter, self._camera.axes, palette)
-            draw_scale(painter, self._camera.px_mm(self.width(), self.height()), palette)
+            px_mm = self._camera.px_mm(self.width(), self.height())
+            draw_measured(painter, self.content, self._project, self._camera.axes, px_mm, palette)
             draw_legend(painter, self.content, QRectF(self.rect()), palette)
             self.draw_hovered(painter, palette)
 
