@@ -3,8 +3,8 @@
 import cv2
 import numpy as np
 import pytest
-
 from benchmarks.fibre_pairs import Kind, draw
+
 from cosmic.frame.errors import ConfigError
 from cosmic.vico.api import find_fibres
 from unit.vico.vision.drawn_fibres import arc, drawn_image
