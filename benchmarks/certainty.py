@@ -400,15 +400,17 @@ def print_fit(processes: int) -> None:
     width = np.percentile([each.pull for each in known if each.pull is not None], 95)
     sys.stdout.write(f"# {', '.join(certainty.NAMES)}\n")
     looked = [each for each in known if each.signs.joint is not None]
+    plain, coded = ([each for each in looked if each.signs.coded is jpeg] for jpeg in (False, True))
     for names, of, count in (
         ("HAND_WEIGHTS, HAND_LOGIT", known, certainty.HAND_MADE),
-        ("WEIGHTS, FITTED_LOGIT", looked, len(certainty.NAMES)),
+        ("WEIGHTS, FITTED_LOGIT", plain, len(certainty.NAMES)),
+        ("JPEG_WEIGHTS, JPEG_LOGIT", coded, len(certainty.NAMES)),
     ):
         *weights, alone = fit(of, count)
         written = ", ".join(f"{each:.2f}" for each in weights)
         sys.stdout.write(f"{names} = ({written}), {alone:.2f}\n")
     sys.stdout.write(f"fitted to {len(known)} that were found, {wrong_ones} of them wrong\n")
-    sys.stdout.write(f"a network has looked at {len(looked)} of them\n")
+    sys.stdout.write(f"a network has looked at {len(plain)} of them, and {len(coded)} as JPEG\n")
     sys.stdout.write(f"95 % of lengths lie within {width:.2f} standard deviations\n")
 
 

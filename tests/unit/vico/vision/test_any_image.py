@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 import pytest
+from benchmarks.fibre_pairs import Kind, draw
 
 from cosmic.frame.errors import ConfigError
 from cosmic.vico.api import find_fibres
@@ -30,6 +31,10 @@ def test_large_images_with_blocks_of_jpeg_are_looked_at(quality: int) -> None:
     widths = [8.0, 14.0, 20.0]
     image = drawn_image(lines, widths, shape=(900, 1200), noise=4.0, seed=quality)
     assert find_fibres(compressed(image, quality))
+
+
+def test_what_jpeg_leaves_that_is_thinner_than_a_pixel_is_looked_at() -> None:
+    assert find_fibres(draw(Kind.TOUCHING, 3_400_074, jpeg=True, compare=False).image)
 
 
 def test_no_odd_image_ends_in_an_exception() -> None:

@@ -143,6 +143,25 @@ def test_a_compressed_fibre_without_a_sign_is_certain() -> None:
     assert plain > compressed
 
 
+def test_on_a_compressed_image_a_network_that_sees_no_joint_makes_more_certain() -> None:
+    weak = Joints(along=np.full((len(NAMES), 1), 0.35))
+    unasked, clear, joined = (
+        probability(Signs(weak, compressed=2.0, joint=level), []) for level in (None, 0.0, 1.0)
+    )
+    assert clear >= CERTAIN > unasked
+    assert joined == unasked
+    strong = Joints(along=np.full((len(NAMES), 1), 1.0))
+    assert probability(Signs(strong, compressed=2.0, joint=0.0), []) < CERTAIN
+
+
+def test_on_compressed_images_most_single_fibres_are_certain() -> None:
+    drawn = [draw(Kind.SINGLE, seed, jpeg=True) for seed in range(200, 248)]
+    found = [drawn_cases(one) for one in drawn if one.view.jpeg >= 70]
+    certain = sum(any(case.fibre.certain and case.right for case in each) for each in found)
+    assert certain >= 0.65 * len(found)
+    assert sum(wrong(each) for each in found) == 0
+
+
 def test_what_compression_hides_at_quality_75_counts_no_more_at_30() -> None:
     image = drawn_image([arc((100.0, 200.0), 0.0, 300.0, 0.3)], [12.0], noise=4.0)
     told = []

@@ -23,6 +23,12 @@ def touching(width: float) -> np.ndarray:
     return drawn_image([first, second], [width, width], noise=2.0)
 
 
+def compressed(image: np.ndarray, quality: int) -> np.ndarray:
+    """Return an image as JPEG keeps it."""
+    coded = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    return np.asarray(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE))
+
+
 @pytest.mark.parametrize("width", [8.0, 14.0, 24.0])
 def test_two_that_touch_are_a_joint_and_one_fibre_is_none(width: float) -> None:
     assert sign(touching(width)) > 1.0
@@ -33,9 +39,14 @@ def test_a_fibre_below_four_pixels_has_no_such_sign() -> None:
     assert sign(drawn_image([LINE], [3.0], noise=1.0)) == 0.0
 
 
-def test_a_compressed_image_is_not_looked_at() -> None:
-    coded = cv2.imencode(".jpg", touching(14.0), [cv2.IMWRITE_JPEG_QUALITY, 40])[1]
-    assert sign(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE)) == 0.0
+@pytest.mark.parametrize("quality", [75, 85])
+def test_on_a_compressed_image_a_joint_is_seen_as_well(quality: int) -> None:
+    assert sign(compressed(touching(14.0), quality)) > 1.0
+    assert sign(compressed(drawn_image([LINE], [14.0], noise=2.0), quality)) < 0.5
+
+
+def test_what_is_mostly_blocks_is_not_looked_at() -> None:
+    assert sign(compressed(touching(14.0), 40)) == 0.0
 
 
 def test_the_sign_depends_on_neither_depth_nor_side_nor_polarity() -> None:

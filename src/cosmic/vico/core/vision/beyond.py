@@ -80,7 +80,8 @@ def is_covered(scene: Scene, course: Course, *, compressed: bool) -> bool:
         line = course.line if at else course.line[::-1]
         half = max(1.0, 0.4 * course.width)
         before = _level(scene, line, away, np.arange(-half, half + 0.5))
-        inner = -np.arange(BESIDE[0] * course.width, BESIDE[1] * course.width)
+        # Two points at least show where it runs: JPEG leaves things thinner than a pixel.
+        inner = -BESIDE[0] * course.width - np.arange(max(2.0, course.width * np.ptp(BESIDE)))
         beside = [
             _level(scene, line, inner, side * (0.5 * course.width + away)) for side in (-1.0, 1.0)
         ]
