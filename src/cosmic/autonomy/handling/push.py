@@ -133,6 +133,8 @@ SLIDE_WELL_TIMES: Final = 4.0
 SLIDE_PART: Final = 0.5
 """Of the push, and of the highest force: a fibre is pressed by no more to be slid, for friction
 bends it up or down beside."""
+COARSE_PART: Final = 0.25
+"""Of a push: its steps where the fibre should have been felt already."""
 CLOSE_PART: Final = 0.2
 """Of how far it is to be pressed: near enough."""
 GROWTH: Final = 1.5
@@ -155,6 +157,11 @@ class _Points:
         self.std_un.append(max(mean.std_un, 1e-3))
         self.time_s.append(mean.time_s)
         self.loading.append(loading)
+
+    def keep_first(self) -> None:
+        """Forget all but the first."""
+        for each in (self.probe_um, self.force_un, self.std_un, self.time_s, self.loading):
+            del each[1:]
 
 
 Reading = Generator[Yielded, object, tuple[float, ForceMean]]
@@ -190,7 +197,7 @@ class OneSpan:
             base = yield from self._baseline()
             contact = yield from self._search(base)
             if self._first and self._push.rest_s > 0.0:
-                base = yield from self._rest(contact)
+                yield from self._rest(contact)
             yield from self._slide(base, contact)
             yield from self._out(base, contact)
             self._place_contact(contact)
@@ -340,20 +347,18 @@ class OneSpan:
             f"{self._fibre.number} should be, {self._plan.span_um:.0f} um from the jaws",
         )
 
-    def _rest(self, free_um: float) -> Generator[Yielded, object, float]:
-        """Wait beside the fibre, and begin anew: stages creep on after a long way.
+    def _rest(self, free_um: float) -> Steps:
+        """Wait where nothing was felt, for stages creep on after a long way.
 
         They did so while the fibre was looked for; what was read meanwhile does not count.
         """
-        push, began_s = self._push, self._points.time_s[0]
-        self._points = _Points()
-        yield from self._advance(free_um - CLEAR_UM)
-        base = yield from self._baseline()
-        rested_s = self._points.time_s[0] - began_s
+        push, points = self._push, self._points
+        _, mean = yield from self._to(free_um - CLEAR_UM, push.search_average_s, loading=True)
+        rested_s = mean.time_s - points.time_s[0]
         if rested_s < push.rest_s:
             yield push.rest_s - rested_s
-        yield from self._measure(push.search_average_s, loading=True)
-        return base
+        points.keep_first()
+        yield from self._measure(push.average_s, loading=True)
 
     def _note_contact(self, probe_um: float, std_um: float) -> None:
         off = probe_um - self._foreseen_um()
@@ -442,8 +447,21 @@ class OneSpan:
             yield from self._to(
                 points.probe_um[-1] + min(step, self._step_um()), push.average_s, loading=True
             )
+            if points.force_un[-1] - base_un > push.contact_un:
+                step = self._plan.stroke_um / push.steps_out
+            elif (farther := self._farther_um(contact_um)) > top:
+                top, step = farther, COARSE_PART * self._plan.stroke_um
         if points.force_un[-1] - base_un > push.limit_un * GROWTH:
             raise OperationFailed(TOO_HIGH, f"{points.force_un[-1] - base_un:.0f} uN")
+
+    def _farther_um(self, contact_um: float) -> float:
+        """Return where a push ends whose fibre is not felt yet.
+
+        It was met somewhere within a step of the search, which may be longer than the whole push.
+        """
+        stroke = self._plan.stroke_um
+        late = min(self._points.probe_um[-1], contact_um + self._push.search_step_um) - contact_um
+        return contact_um + stroke + (late if late > 0.5 * stroke else 0.0)
 
     def _dwell(self) -> Steps:
         """Read the force at the farthest point for a while: the fibre may relax."""

@@ -76,7 +76,7 @@ def test_intervals_are_narrower_by_it_only_where_fibres_are_alike(
     assert together == pytest.approx(alone, rel=0.05)
 
 
-def test_one_fibre_tells_nothing_of_others() -> None:
+def test_one_fibre_shows_nothing_of_others() -> None:
     assert holds_of([slid(1, 0.1).spans]) == UNKNOWN_HOLDS
     assert holds_of([]) == UNKNOWN_HOLDS
     never = [measure_fibre(pushed(rig(n)), settings=FitSettings()).spans for n in range(3)]
@@ -84,7 +84,7 @@ def test_one_fibre_tells_nothing_of_others() -> None:
 
 
 @pytest.mark.parametrize("noise_times", [0.2, 5.0])
-def test_holds_are_told_whatever_the_noise_is_said_to_be(noise_times: float) -> None:
+def test_holds_are_found_whatever_the_noise_is_taken_to_be(noise_times: float) -> None:
     fibres = [
         [
             dataclasses.replace(each, freed_std_part=each.freed_std_part * noise_times)
