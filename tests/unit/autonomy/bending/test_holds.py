@@ -7,7 +7,7 @@ import statistics
 import numpy as np
 import pytest
 
-from cosmic.autonomy.bending import fit
+from cosmic.autonomy.bending import fit, population
 from cosmic.autonomy.bending.fit import (
     MeasuredFibre,
     assess_campaign,
@@ -15,6 +15,7 @@ from cosmic.autonomy.bending.fit import (
     measure_fibre,
 )
 from cosmic.autonomy.bending.holds import UNKNOWN_HOLDS, holds_of
+from cosmic.autonomy.bending.inference import FRICTION
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Freed
 from unit.autonomy.bending.test_fit_bending import pushed, rig
@@ -95,3 +96,18 @@ def test_holds_are_found_whatever_the_noise_is_taken_to_be(noise_times: float) -
     holds = holds_of(fibres)
     assert holds.mean == pytest.approx(math.log(0.9), abs=0.03)
     assert math.isfinite(holds.std)
+
+
+def test_of_many_fibres_no_more_is_learned_than_of_so_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    readings = [slid(seed, 0.0).readings for seed in range(FIBRES)]
+
+    def known(most: int) -> float:
+        monkeypatch.setattr(population, "MOST_TAUGHT", most)
+        common = population.assess(
+            [each for each in readings if each is not None], FitSettings()
+        ).common
+        return float(np.sqrt(np.diag(common.covariance))[FRICTION])
+
+    all_count, few_count = known(FIBRES), known(2)
+    assert few_count > 1.2 * all_count
+    assert few_count < FitSettings().friction_std
