@@ -180,28 +180,24 @@ def readings_of(
     direction : tuple of float, optional
         By how much the fibre leaves the jaws in another direction than the image shows, and the
         standard deviation of that, rad; by the settings if None.
-    slipped : bool
-        See `Readings`.
-    holds : Holds
-        How far sections of the campaign are held.
+    slipped, holds : bool, Holds
+        See `Readings`; and how far sections of the campaign are held.
     """
     rows = _rows(fits)
     span = np.array([each.span for each in rows])
     k = np.array([each.k_un_um for each in rows])
     sign = np.array([each.sign for each in rows])
     friction = np.array([each.by_friction for each in rows])
-    contact = response.by_contact[span]
     glass = certified is not None
     softer, by_shear, shear = _sheared(response.by_square[span], settings, glass=glass)
     to_common = _to_common(fits, rows, friction, response, by_shear, part)
+    own = (*_own(response, span, settings, direction), shear)
     if glass:
         # Glass rubs and shears otherwise than fibres do.
         to_common[:, [FRICTION, SHEAR]] = 0.0
-    same = span[:, None] == span[None, :]
-    own = (*_own(response, span, settings, direction), shear)
-    freed = None if glass else _freed(fits, rows, holds)
-    if glass:
         own = (*own[1:], ("friction", "", friction, 0.0, settings.friction_std))
+    same = span[:, None] == span[None, :]
+    freed = None if glass else _freed(fits, rows, holds)
     if freed is not None:
         shift, askew = freed
         # The friction along the fibre may have let go as well.
@@ -215,13 +211,19 @@ def readings_of(
         span=span,
         to_common=to_common,
         own=own,
-        repeat=np.outer(contact, contact) * same * settings.contact_std_um**2,
+        repeat=_repeated(response, span, settings),
         askew=askew,
         response=response,
         longest=_longest(response),
         certified=certified,
         slipped=slipped,
     )
+
+
+def _repeated(response: Response, span: np.ndarray, settings: FitSettings) -> Floats:
+    """Return the covariance of ln(k) by where the probe touches, the same both ways of a span."""
+    contact = settings.contact_std_um * response.by_contact[span]
+    return np.asarray(np.outer(contact, contact) * (span[:, None] == span[None, :]))
 
 
 def _sheared(
