@@ -8,6 +8,7 @@ from typing import Final, Protocol
 
 from typing_extensions import override
 
+from cosmic.autonomy.bending.fit import Refits
 from cosmic.autonomy.calibrating.registry import CalibrationRegistry
 from cosmic.autonomy.coordinate_transform import NO_TABLE, PlatformTransform
 from cosmic.autonomy.handling.force import ForceWatch
@@ -60,6 +61,8 @@ class SharedWorkspace:
         Why fibres of the last survey are not taken, and how many.
     finished : list of HeldFibre
         Those that were put away.
+    refits : Refits
+        Of those, as they were fitted together.
     plate_from : int
         How many were put away before the plate that is there now.
     surveys : int
@@ -98,6 +101,7 @@ class SharedWorkspace:
     since_survey: int = 0
     survey_deg: float = 0.0
     finished: list[HeldFibre] = field(default_factory=list)
+    refits: Refits = field(default_factory=Refits)
     plate_from: int = 0
     surveys: int = 0
     numbers: int = 0

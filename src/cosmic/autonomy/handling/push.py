@@ -662,6 +662,7 @@ class FitSpans(FibreOperation):
             [each for each in measured if each.certificate is None],
             standards=[each for each in measured if each.certificate is not None],
             settings=fit,
+            refits=work.shared.refits,
         )
         fibre.bending = (found.standards if fibre.standard else found.fibres)[-1]
         if not fibre.bending.trusted:
