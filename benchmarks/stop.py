@@ -164,7 +164,7 @@ def trajectory(stand: FullStand, _number: int) -> Callable[[], object]:
 def control_loop(stand: FullStand, _number: int) -> Callable[[], object]:
     """Hold a force, or rather look for it where nothing is."""
     loop = stand.rig.control.hold_force("force", "probe.y", 50.0, direction=-1)
-    wait_until(lambda: stand.mico["probe.y"].details.in_motion)
+    wait_until(lambda: stand.mico["probe.y"].details.in_motion, 20.0)
     return loop.stop
 
 

@@ -209,6 +209,29 @@ def test_however_it_ends_the_axis_stands(
         undo(lazy)
 
 
+def test_a_computer_that_is_late_with_a_simulated_board_ends_no_loop(lazy: Bench) -> None:
+    late, began, packets = Event(), Event(), 0
+
+    def hinder(_chunk: object) -> None:
+        began.set()
+        late.wait(5.0)
+
+    with lazy.hold() as loop:
+        wait_until(lambda: loop.statistics.packets > 2)
+        forget = lazy.rig.daqco.subscribe(hinder)
+        try:
+            assert began.wait(5.0)
+            WALL.sleep(1.5 * lazy.rig.control.settings.stale_s)
+            packets = loop.statistics.packets
+            WALL.sleep(0.2)
+            assert loop.running, loop.reason
+            assert loop.statistics.packets == packets, "the axis waits"
+        finally:
+            late.set()
+            forget()
+        wait_until(lambda: loop.statistics.packets > packets)
+
+
 def test_who_commands_the_axis_meanwhile_has_it(far: Bench) -> None:
     loop = far.hold()
     wait_until(lambda: loop.statistics.packets > 2)

@@ -17,6 +17,7 @@ Knows no Qt, so that helper processes can use it.
 """
 
 import gc
+import linecache
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -132,6 +133,7 @@ class Garbage:
             if by_hand and (gc.isenabled() or self._by_hand):
                 self._by_hand[number] = get_ident()
                 gc.disable()
+            forget_sources()
             gc.freeze()
             self._grown = 0
             self._moved_s = self._collected_s = self._now_s()
@@ -202,6 +204,7 @@ class Garbage:
         gc.freeze()
         self._collected_s = self._now_s()
         if at_rest:
+            forget_sources()
             give_memory_back()
         left = gc.get_freeze_count()
         self._grown = 0 if whole else self._grown + left - before
@@ -232,6 +235,18 @@ def objects_of(generation: int | None = None) -> int:
     listed, counted and dropped is in one step of the interpreter, which `map` does.
     """
     return next(map(len, map(gc.get_objects, (generation,))))
+
+
+def forget_sources() -> None:
+    """Let go of the source texts of modules; any thread.
+
+    PySide reads that of every module that is imported, and Python keeps them for tracebacks: 30 MB
+    at the start. A traceback reads what it needs again. What was typed is in no file, and stays.
+    """
+    for name, kept in list(linecache.cache.items()):
+        read_from_file = len(kept) > 1 and kept[1] is not None
+        if read_from_file:
+            linecache.cache.pop(name, None)
 
 
 def freeze_what_is_loaded() -> None:

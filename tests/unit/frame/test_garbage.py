@@ -1,6 +1,8 @@
 """Old objects are looked through when nothing moves, and everything is put back at the end."""
 
 import gc
+import linecache
+import traceback
 import weakref
 from collections.abc import Callable, Iterator
 from threading import Event, Thread
@@ -308,3 +310,26 @@ def test_objects_are_counted_while_another_thread_builds_a_tuple() -> None:
         thread.join()
     assert not failed
     assert min(counts) > 0
+
+
+def test_source_texts_of_modules_are_given_up_and_what_was_typed_stays(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    typed = len("x"), None, ["x\n"], "<console>"
+    monkeypatch.setitem(linecache.cache, "<console>", typed)
+    assert linecache.getline(garbage.__file__, 1)
+    bench = Bench()
+    try:
+        assert garbage.__file__ not in linecache.cache
+        assert linecache.getline(garbage.__file__, 1), "it is read again"
+        ring = old_ring(WORTHWHILE + 1)
+        ring[0].clear()
+        assert bench.after(1.0) is not None
+        assert garbage.__file__ not in linecache.cache
+    finally:
+        bench.end()
+    assert linecache.cache["<console>"] == typed
+    try:
+        raise ValueError("asked for")
+    except ValueError as exc:
+        assert 'raise ValueError("asked for")' in "".join(traceback.format_exception(exc))

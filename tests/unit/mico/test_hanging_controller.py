@@ -126,6 +126,49 @@ def test_a_stop_returns_where_the_whole_library_hangs_and_that_was_not_reported_
         wait_until(lambda: Channel(0, 0) in {each[1] for each in controller.of("stop")})
 
 
+def test_a_stop_soon_after_the_library_began_to_hang_returns(hang):
+    with mico(TWO, instant=False) as (rig, controller):
+        hang.into(controller, *EVERYTHING)
+        rig["d0.c0"].move_to(100.0, wait=False)
+        wait_until(lambda: rig["d0.c0"].details.in_motion)
+        hang.hanging = True
+        WALL.sleep(0.6)
+        stopping = threading.Thread(target=rig.application.manager.stop, args=("test",))
+        stopping.start()
+        stopping.join(PROMPT_S)
+        returned = not stopping.is_alive()
+        hang.end()
+        stopping.join()
+        assert returned
+
+
+def test_a_stop_that_the_library_does_not_carry_out_is_reported_though_its_caller_hangs(hang, caplog):
+    with mico(TWO, instant=False) as (rig, controller):
+        hang.into(controller, "stop")
+        manager = rig.application.manager
+        announced: list[str | None] = []
+        manager.latch.subscribe(lambda state: announced.append(state.reason))
+        moving = rig["d1.c0"].move_to(100.0, wait=False)
+        wait_until(lambda: rig["d1.c0"].details.in_motion)
+        hang.hanging = True
+        stopping = threading.Thread(target=manager.stop, args=("test",))
+        stopping.start()
+        try:
+            wait_until(lambda: "a stop is not carried out" in rig["d0.c0"].details.error)
+            assert stopping.is_alive()
+            assert announced == ["test"]
+            assert "device 0 (d0.c0, d0.c1, d0.c2): a stop is not carried out" in caplog.text
+            with pytest.raises(cosmic.StoppedError):
+                moving.wait(5.0)
+            assert not rig["d1.c0"].details.error
+            assert prompt(lambda: manager.stop("again"))
+        finally:
+            hang.end()
+            stopping.join()
+        wait_until(lambda: not rig["d0.c0"].details.error)
+        assert "has returned from the stop" in caplog.text
+
+
 def test_a_library_that_hangs_even_in_closing_is_left_behind(hang, caplog):
     with mico(TWO) as (rig, controller):
         hang.into(controller, *EVERYTHING)

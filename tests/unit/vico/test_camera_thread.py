@@ -3,7 +3,7 @@
 import itertools
 import logging
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from threading import Event
 from typing import Any
@@ -27,9 +27,11 @@ from cosmic.vico.hw.interface import (
     CameraSettings,
     Frame,
     PixelFormat,
+    Pixels,
     Range,
     Roi,
 )
+from cosmic.vico.hw.sim_camera import DrawnFrame
 
 WIDTH, HEIGHT = 64, 48
 FORMATS = (PixelFormat.MONO8, PixelFormat.MONO12, PixelFormat.RGB8)
@@ -37,7 +39,7 @@ GREY = np.zeros((HEIGHT, WIDTH), np.uint8)
 
 
 class OddCamera(BaseCamera):
-    """Gives `data` as its images, whatever its settings say."""
+    """Gives `data` as its images, or what `draw` draws, whatever its settings say."""
 
     def __init__(self) -> None:
         info = CameraInfo("odd", "ACME", "Odd", "SN-7", sensor_px=(WIDTH, HEIGHT))
@@ -45,6 +47,7 @@ class OddCamera(BaseCamera):
         self.data: Any = GREY
         self.pixel_format = PixelFormat.MONO8
         self.ahead_s = 0.0
+        self.draw: Callable[[], Pixels] | None = None
         self._numbers = itertools.count()
         self._in_force = CameraSettings(0.001, 0.0, 100.0, Roi(0, 0, WIDTH, HEIGHT))
         self._opened((WIDTH, HEIGHT))
@@ -72,6 +75,9 @@ class OddCamera(BaseCamera):
             return None
         now_s = WALL.now_s()
         exposed_s = now_s + self.ahead_s
+        if self.draw is not None:
+            size_px = WIDTH, HEIGHT
+            return DrawnFrame(self.draw, next(self._numbers), now_s, now_s, size_px=size_px)
         return Frame(
             self.data, next(self._numbers), now_s, exposed_s, pixel_format=self.pixel_format
         )
@@ -228,6 +234,34 @@ def test_a_driver_that_hangs_is_named_and_nobody_waits_for_it(
     thread.start_images().wait(5.0)
     assert thread.next_image(WALL.now_s(), 5.0) is not None
     assert len([each for each in caplog.records if each.levelno >= logging.ERROR]) == 1
+
+
+@pytest.mark.parametrize("how", ["looked at", "stopped"])
+def test_an_image_that_a_busy_computer_draws_late_is_no_driver_that_hangs(
+    how: str, bench: Bench
+) -> None:
+    begun, drawn = Event(), Event()
+
+    def draw() -> Pixels:
+        begun.set()
+        drawn.wait(10.0)
+        return GREY
+
+    thread = bench.thread
+    bench.camera.draw = draw
+    assert wait_until(lambda: isinstance(thread.last and thread.last.frame, DrawnFrame))
+    stopping = thread.stop_images() if how == "stopped" else None
+    assert wait_until(lambda: (stopping or thread.newest) and begun.is_set())
+    try:
+        thread.heartbeat.look(0.5)
+        for _ in range(4):
+            thread.heartbeat.look(STALL_S)
+        assert not thread.problem
+        waiting = thread.start_images()
+    finally:
+        drawn.set()
+    waiting.wait(5.0)
+    assert stopping is None or stopping.done
 
 
 def test_a_camera_that_gives_nothing_and_returns_does_not_hang(bench: Bench) -> None:

@@ -126,7 +126,7 @@ class ControlLoop(WorkerThread):
         self._error: CosmicError | None = None
         self._over = Operation[ControlEnding](f"the loop of {source.name}")
         self._real_time = "it has not started"
-        self._begun_wall_s = 0.0
+        self._begun_wall_s = self._begun_s = 0.0
         self._zero = 0.0
         self.state = ControlState.STARTING
         self.reading = ControlReading()
@@ -158,7 +158,7 @@ class ControlLoop(WorkerThread):
         """Take the axis and start; raises what `Source.begin` and `AxisSink.begin` raise."""
         self.sink.begin()
         self._zero = self.sink.zero
-        self._begun_wall_s = WALL.now_s()
+        self._begun_wall_s, self._begun_s = WALL.now_s(), self.source.clock.now_s()
         self.source.begin(self.finish)
         self.start()
         logger.info("control loop: %s by %s begins", self.source.name, self.sink.name)
@@ -246,10 +246,11 @@ class ControlLoop(WorkerThread):
 
     def _fresh(self) -> Sample | None:
         """Return the newest value, None before the first; raises when it is old or no number."""
-        source, now_s = self.source, WALL.now_s()
+        source, clock = self.source, self.source.clock
+        now_s = clock.now_s()
         sample = source.newest()
-        since_s = self._begun_wall_s if sample is None else sample.read_wall_s
-        if not now_s - since_s <= source.stale_s:
+        since_s = self._begun_s if sample is None else sample.read_s
+        if not now_s - since_s <= source.stale_s * (clock.rate or 1.0):
             raise _StaleError(f"no data of {source.name} for {source.stale_s:g} s")
         if sample is not None and not math.isfinite(sample.value):
             raise _StaleError(f"{source.name} is no number")

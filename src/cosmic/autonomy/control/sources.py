@@ -13,7 +13,7 @@ from typing_extensions import override
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.guarded import changed_quantity, measurable
-from cosmic.frame.clock import WALL
+from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import ConfigError, CosmicError, LimitError, NotAvailable
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.api.mico import Mico
@@ -24,10 +24,11 @@ IDLE_POLLS: Final = 2.5
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """The newest value and the wall time at which it came."""
+    """The newest value, and when it came: by the wall and by the clock of its source."""
 
     value: float
     read_wall_s: float
+    read_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +83,13 @@ class Source(Protocol):
 
     @property
     @abstractmethod
+    def clock(self) -> Clock:
+        """By which a value is too old; that of a simulated platform waits for a busy computer."""
+
+    @property
+    @abstractmethod
     def stale_s(self) -> float:
-        """How old a value may be, wall time, before the loop ends."""
+        """How old a value may be before the loop ends; wall time where `clock` does not wait."""
 
     @property
     @abstractmethod
@@ -127,6 +133,7 @@ class ChannelSource(Source):
                 f"there is no active channel {channel!r}; there are {', '.join(daqco.channels)}"
             )
         self._daqco = daqco
+        self._clock = daqco.clock
         self._channel = channel
         self._unit = daqco.units[channel]
         # Values by another scale, or of another input, are not of the quantity that is held.
@@ -151,6 +158,11 @@ class ChannelSource(Source):
     @override
     def measurable(self) -> tuple[float, float]:
         return measurable(self._channel, self._settings)
+
+    @property
+    @override
+    def clock(self) -> Clock:
+        return self._clock
 
     @property
     @override
@@ -187,7 +199,7 @@ class ChannelSource(Source):
             return
         row = chunk.channels.index(self._channel)
         values = chunk.scales[row].apply(chunk.volts[row])
-        self._newest = Sample(float(values[-1]), WALL.now_s())
+        self._newest = Sample(float(values[-1]), WALL.now_s(), self._clock.now_s())
         if (crossed := self._limits.crossed(values)) is not None:
             self._report(crossed)
 
@@ -252,6 +264,11 @@ class PositionSource(Source):
 
     @property
     @override
+    def clock(self) -> Clock:
+        return WALL
+
+    @property
+    @override
     def stale_s(self) -> float:
         return self._stale_s
 
@@ -273,7 +290,7 @@ class PositionSource(Source):
         crossed = self._limits.crossed(state.position)
         if crossed is not None and self._on_limit is not None:
             self._on_limit(crossed)
-        return Sample(state.position, state.read_wall_s)
+        return Sample(state.position, state.read_wall_s, state.read_wall_s)
 
     @override
     def end(self) -> None:

@@ -265,7 +265,7 @@ class CameraThread(WorkerThread):
             self._running = False
             camera.stop()
             if self._newest is not None:
-                self._newest.data.view()  # it stays, and is drawn while that can be
+                self._draw(self._newest)  # it stays, and is drawn while that can be
 
         return self._put(f"Stopping {self.camera_name}", command)
 
@@ -452,8 +452,14 @@ class CameraThread(WorkerThread):
             self._shown = None
         elif now_s - self._drawn_s >= 1.0 / SHOWN_HZ:
             self._drawn_s = now_s
-            image.data.view()
+            self._draw(image)
             self._shown = image
+
+    def _draw(self, image: CameraImage) -> None:
+        """Wait for the pixels of a simulated image; that is no call of a driver."""
+        self.heartbeat.beat(math.inf)
+        image.data.view()
+        self.heartbeat.beat()
 
     def _lose(self, error: CosmicError) -> None:
         """Say why there are no images, and wait before the camera is looked for again."""

@@ -11,6 +11,7 @@ from cosmic.autonomy.control.sources import ChannelSource, PositionSource
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings
+from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ConfigError, CosmicError, LimitError
 
 SCALE = Scale("Probe", "uN", (0.0, 20.0))
@@ -31,7 +32,7 @@ class Daqco:
 
     channels = ("force",)
     units = {"force": "uN"}  # noqa: RUF012 - nobody changes it
-    running, problem = True, ""
+    running, problem, clock = True, "", WALL
 
     def __init__(self) -> None:
         self.settings = settings()

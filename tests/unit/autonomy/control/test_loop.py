@@ -10,7 +10,7 @@ from cosmic.autonomy.control.law import Answer, ControlState
 from cosmic.autonomy.control.loop import ControlLoop
 from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.autonomy.control.sources import Sample
-from cosmic.frame.clock import WALL
+from cosmic.frame.clock import WALL, ManualClock
 from cosmic.frame.errors import NotConnectedError
 from cosmic.frame.failure import FailurePolicy
 from unit.mico.rigs import wait_until
@@ -38,12 +38,17 @@ def source() -> Any:
         stale_s=1.0,
         pause_s=1.0,
         begin=lambda _on_limit: None,
-        newest=lambda: Sample(10.0, WALL.now_s()),
+        clock=WALL,
+        newest=lambda: Sample(10.0, WALL.now_s(), WALL.now_s()),
         end=lambda: None,
     )
 
 
-def sink(moved_s: list[float], close: Callable[[object], object] = lambda _error: None) -> Any:
+def sink(
+    moved_s: list[float],
+    close: Callable[[object], object] = lambda _error: None,
+    braked_s: list[float] | None = None,
+) -> Any:
     """An axis that notes for how long it was to move."""
     return SimpleNamespace(
         name="probe.y",
@@ -52,6 +57,7 @@ def sink(moved_s: list[float], close: Callable[[object], object] = lambda _error
         packets=0,
         begin=lambda: None,
         move=lambda _velocity, dt_s: moved_s.append(dt_s),
+        brake=braked_s.append if braked_s is not None else lambda _dt_s: None,
         close=close,
     )
 
@@ -88,3 +94,30 @@ def test_a_loop_whose_axis_cannot_be_stopped_any_more_ends_and_says_so(
     assert loop.over.wait(5.0) == "asked to"
     assert loop.join()
     assert "probe.y could not be stopped: the station fibres does not answer" in caplog.text
+
+
+def test_what_is_silent_ends_a_loop_by_the_clock_of_the_source_alone() -> None:
+    clock, settings = ManualClock(), ControlSettings(real_time=False)
+    silent = source()
+    begun_wall_s = WALL.now_s()
+    silent.clock, silent.stale_s, silent.pause_s = clock, 0.1, 0.05
+    silent.newest = lambda: Sample(10.0, begun_wall_s, 0.0)
+    moved_s, braked_s = list[float](), list[float]()
+    loop = ControlLoop(
+        silent,
+        StallingLaw(),
+        sink(moved_s, braked_s=braked_s),
+        settings,
+        rate=1.0,
+        policy=FailurePolicy(),
+    )
+    loop.begin()
+    try:
+        wait_until(lambda: WALL.now_s() > begun_wall_s + 0.3)
+        assert loop.ending is None
+        assert braked_s, "the axis waits"
+        clock.advance(0.2)
+        assert loop.over.wait(5.0) == "no data"
+    finally:
+        loop.finish()
+        loop.join()

@@ -196,6 +196,8 @@ class Device(WorkerThread):
     position_changed(PositionChanged), state_changed(PositionerState),
     movement_begun(MovementBegun), movement_ended(MovementEnded), movement_refused(MoveVerdict),
     lost(DeviceLost)
+    stop_late()
+        The library does not return from a stop; in the thread of the watch.
 
     Attributes
     ----------
@@ -211,6 +213,7 @@ class Device(WorkerThread):
     movement_ended = Signal(object)
     movement_refused = Signal(object)
     lost = Signal(object)
+    stop_late = Signal()
 
     def __init__(
         self,
@@ -224,7 +227,7 @@ class Device(WorkerThread):
         parent: QObject | None = None,
     ) -> None:
         super().__init__(f"device {container.device}", policy, parent)
-        self.calls = DriverCalls(self.name, policy, self._on_stall)
+        self.calls = DriverCalls(self.name, policy, self._on_stall, self._on_late_stop)
         self._controller = controller
         self.container = container
         self._settings = settings
@@ -234,7 +237,7 @@ class Device(WorkerThread):
         self._nudged = False
         self._stops_seen = 0
         self._newest: dict[int, Order] = {}
-        self._stall = ""
+        self._stall = self._unstopped = ""
         self._void: dict[int, int] = {}
         self._queries = GateQueue(
             gate, clock=clock, inbox=self._inbox, policy=policy, device=container.device
@@ -343,10 +346,7 @@ class Device(WorkerThread):
 
     def stop_channel(self, channel: int) -> None:
         """Have the library stop one channel, past every queue."""
-        if self.calls.suspect:
-            self.calls.past(partial(self._stop_channel, channel))
-        else:
-            self._stop_channel(channel)
+        self.calls.stop(partial(self._stop_channel, channel))
 
     def _stop_channel(self, channel: int) -> None:
         try:
@@ -662,12 +662,10 @@ class Device(WorkerThread):
         if not stalled_s:
             text, self._stall = self._stall, ""
             logger.warning("device %d: the controller has returned, and goes on", self.index)
-            self._mark(text, "")
+            self._mark(text, self._unstopped)
             return
-        channels = self.container.channels()
-        axes = ", ".join(map(self._shown, channels)) or "no axes yet"
         text = (
-            f"device {self.index} ({axes}): its controller has not returned from a call for "
+            f"{self._with_axes()}: its controller has not returned from a call for "
             f"{stalled_s:g} s; whether these axes move is unknown. Check its power and cable, or "
             "unplug it and plug it in again; if that does not help, restart the program"
         )
@@ -682,6 +680,26 @@ class Device(WorkerThread):
         self._policy.report(error, self.name)
         for order in waiting:
             order.movement.fail(error)
+
+    def _on_late_stop(self, late_s: float) -> None:
+        """Say that a stop is not carried out, or that it is now; thread of the watch."""
+        if not late_s:
+            text, self._unstopped = self._unstopped, ""
+            logger.warning("device %d: the controller has returned from the stop", self.index)
+            self._mark(text, self._stall)
+            return
+        text = (
+            f"{self._with_axes()}: a stop is not carried out: its controller has not returned from "
+            f"it for {late_s:g} s; whether these axes move is unknown. Cut its power if they do"
+        )
+        self._unstopped = text
+        self._mark("", text)
+        self.stop_late.emit()
+        self._policy.report(DeviceTimeout(text, fault=DeviceFault.TIMEOUT), self.name)
+
+    def _with_axes(self) -> str:
+        axes = ", ".join(map(self._shown, self.container.channels())) or "no axes yet"
+        return f"device {self.index} ({axes})"
 
     def _mark(self, before: str, text: str) -> None:
         """Show `text` at every axis that is here, in place of `before`."""

@@ -1,5 +1,6 @@
 """`DriverCalls`: notices a library that does not return, and stops past it all the same."""
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Final
@@ -10,8 +11,10 @@ from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.threads import JOIN_TIMEOUT_S, WorkerThread
 
 _KNOWN_TO_HANG_S: Final = 0.5
-SUSPECT_S: Final = 1.0
+SUSPECT_S: Final = 0.25
 """After so long in a call a device may hang: others stop it in a thread of its own."""
+LATE_S: Final = 1.0
+"""A stop from which the library has not returned by then is told not to be carried out."""
 
 
 class DriverCalls:
@@ -19,19 +22,27 @@ class DriverCalls:
 
     Attributes
     ----------
-    device, listener : Heartbeat
-        Of the thread that commands and of the one that receives.
+    device, listener, stops : Heartbeat
+        Of the thread that commands, of the one that receives, and of whoever stops.
 
     Parameters
     ----------
-    on_stall : callable
-        Takes for how many seconds a call has not returned, and 0.0 once all have; called in
-        the thread of the watch.
+    on_stall, on_late_stop : callable
+        Take for how many seconds a call, or one that stops, has not returned, and 0.0 once all
+        have; called in the thread of the watch.
     """
 
-    def __init__(self, name: str, policy: FailurePolicy, on_stall: Callable[[float], None]) -> None:
+    def __init__(
+        self,
+        name: str,
+        policy: FailurePolicy,
+        on_stall: Callable[[float], None],
+        on_late_stop: Callable[[float], None],
+    ) -> None:
         self.device = Heartbeat(partial(self._on_stall, 0))
         self.listener = Heartbeat(partial(self._on_stall, 1))
+        self.stops = Heartbeat(on_late_stop)
+        self._stopping: set[object] = set()
         self._stalled: set[int] = set()
         self._report = on_stall
         self._stops = JobQueue(f"stop of {name}", policy)
@@ -40,15 +51,30 @@ class DriverCalls:
     @property
     def suspect(self) -> bool:
         """Whether a call of the library may hang."""
-        return self.device.overdue(SUSPECT_S) or self.listener.overdue(SUSPECT_S)
+        every = (self.device, self.listener, self.stops)
+        return any(each.overdue(SUSPECT_S) for each in every)
 
-    def past(self, call: Callable[[], None]) -> None:
-        """Make a call that stops in another thread, for it may hang in it; returns at once.
+    def stop(self, call: Callable[[], None]) -> None:
+        """Make a call that stops; where it may hang in the library, in another thread.
 
         That thread makes one after the other; the device thread repeats each when it comes back.
         """
+        if not self.suspect:
+            self._watched(call)
+            return
         self._stopped_past = True
-        self._stops.submit(call, "stop")
+        self._stops.submit(partial(self._watched, call), "stop")
+
+    def _watched(self, call: Callable[[], None]) -> None:
+        mine = object()
+        self._stopping.add(mine)
+        self.stops.beat(LATE_S)
+        try:
+            call()
+        finally:
+            self._stopping.discard(mine)
+            if not self._stopping:
+                self.stops.beat(math.inf)
 
     def _on_stall(self, which: int, stalled_s: float) -> None:
         before = bool(self._stalled)

@@ -77,6 +77,8 @@ class DeviceMaker:
     ----------
     on_lost : callable
         Method of a QObject, called in the thread of a device that cannot be reached any more.
+    on_stop_late : callable
+        Method of a QObject, called where the library does not return from a stop.
     """
 
     def __init__(
@@ -88,6 +90,7 @@ class DeviceMaker:
         settings: MicoSettings,
         policy: FailurePolicy,
         on_lost: Callable[[DeviceLost], None],
+        on_stop_late: Callable[[], None],
     ) -> None:
         self._controller = controller
         self._gate = gate
@@ -95,6 +98,7 @@ class DeviceMaker:
         self._settings = settings
         self._policy = policy
         self._on_lost = on_lost
+        self._on_stop_late = on_stop_late
 
     def inventory(
         self,
@@ -150,6 +154,7 @@ class DeviceMaker:
             policy=self._policy,
         )
         device.lost.connect(self._on_lost, Qt.ConnectionType.DirectConnection)
+        device.stop_late.connect(self._on_stop_late, Qt.ConnectionType.DirectConnection)
         return device
 
 
@@ -280,7 +285,8 @@ class DeviceThreads:
             listener.start()
             device.begin()
             if self._driver_watch is not None:
-                self._driver_watch.add([device.calls.device, device.calls.listener])
+                calls = device.calls
+                self._driver_watch.add([calls.device, calls.listener, calls.stops])
 
     def stop_channels(self, devices: Iterable[Device]) -> None:
         """Stop every channel of devices, past their threads: first those known to move.
@@ -412,6 +418,7 @@ class DeviceManager(QObject):
             settings=settings,
             policy=policy,
             on_lost=self._on_device_lost,
+            on_stop_late=self._on_stop_late,
         )
         self._groups = self._make_groups()
         if self.exemptions is not None:
@@ -757,6 +764,11 @@ class DeviceManager(QObject):
             return
         for name in sorted(self.gate.expire(affected)):
             self.device(name).halt(self.address(name).channel, WATCHED_AGAIN)
+
+    def _on_stop_late(self) -> None:
+        """Announce a stop whose caller hangs in the library; thread of the watch."""
+        if self.latch.state.latched:
+            self.latch.announce()
 
     def _on_device_lost(self, lost: DeviceLost) -> None:
         self._note_missing(lost.reason)
