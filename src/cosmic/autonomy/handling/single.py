@@ -17,10 +17,10 @@ from cosmic.autonomy.handling.force_limit import arm_force_limit, put_back
 from cosmic.autonomy.handling.grasp import in_jaws, seen_at, shape_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.jaws import move_jaws, note_closed, note_gap
+from cosmic.autonomy.handling.one_span import OneSpan
 from cosmic.autonomy.handling.plate import along
 from cosmic.autonomy.handling.prepare import retract_probe, zoom_to
 from cosmic.autonomy.handling.push import (
-    OneSpan,
     fit_settings,
     ready_force,
     span_limits,
