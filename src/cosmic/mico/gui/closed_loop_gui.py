@@ -3,17 +3,17 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QToolButton, QVBoxLayout, QWidget
 
 from cosmic.frame.errors import CosmicError, MoveRefused
-from cosmic.frame.gui.build import named, push_button
+from cosmic.frame.gui.build import named, push_button, styled, tipped
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override
 from cosmic.frame.units import format_quantity
 from cosmic.mico.core.motion.positioner import PositionerState
-from cosmic.mico.gui.axis_menu import AxisMenu
 from cosmic.mico.gui.link_switch import LinkSwitch
 from cosmic.mico.gui.move_row import MoveFields
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
@@ -62,14 +62,43 @@ class ClosedLoopGUI(PositionerBaseGUI):
         self._link.unlink_wanted.connect(self.unlink_wanted)
 
     def _make_menu(self) -> None:
+        """Make what an axis with sensor can be asked besides moving."""
         name, settings = self.settings.name, self.settings
-        self._menu = AxisMenu(name, settings.forward_text, settings.backward_text, self)
-        self._menu.zero_set.connect(self._on_zero_set)
-        self._menu.zero_cleared.connect(self._on_zero_cleared)
-        self._menu.reference_requested.connect(self._on_reference)
-        self._menu.calibrate_requested.connect(self._on_calibrate)
-        self._menu.end_stop_requested.connect(self._on_end_stop)
-        self._menu.more_toggled.connect(self._on_more)
+        tip = f"Zero, reference, calibration, end stops, steps and speed: {name}"
+        self._menu = styled(named(tipped(QToolButton(), tip), "axisMenu"), "menu")
+        self._menu.setText("⋯")
+        self._menu.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self._menu.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
+        menu = QMenu(self._menu)
+        menu.setToolTipsVisible(True)
+        self._menu.setMenu(menu)
+
+        def add(text: str, tip: str) -> QAction:
+            action = menu.addAction(text)
+            action.setToolTip(tip)
+            return action
+
+        set_zero = add("Set zero here", "Count positions from here; limits stay where they are")
+        set_zero.triggered.connect(self._on_zero_set)
+        clear_zero = add("Clear zero", "Count positions as the controller does")
+        clear_zero.triggered.connect(self._on_zero_cleared)
+        menu.addSeparator()
+        reference = add("Find reference", "Find the reference; may sweep the whole travel")
+        reference.triggered.connect(self._on_reference)
+        calibrate = add("Calibrate sensor", "Moves millimetres in both directions")
+        calibrate.triggered.connect(self._on_calibrate)
+        ahead = add(
+            f"To the end stop: {settings.forward_text}", "Drive forwards until the travel ends"
+        )
+        ahead.triggered.connect(self._on_end_forward)
+        back = add(
+            f"To the end stop: {settings.backward_text}", "Drive backwards until the travel ends"
+        )
+        back.triggered.connect(self._on_end_backward)
+        menu.addSeparator()
+        more = add("Show steps and speed", "Move by steps or in several steps, and set the speed")
+        more.setCheckable(True)
+        more.toggled.connect(self._on_more)
 
     def _make_speed(self) -> None:
         low, high = self.axis.details.frequency_range_hz
@@ -92,7 +121,7 @@ class ClosedLoopGUI(PositionerBaseGUI):
     def _second_row(self) -> Sequence[QWidget]:
         move = self._move
         buttons = (self._backward, move.distance, self._forward)
-        return *buttons, _gap(), move.target, move.go_to, self._menu.button
+        return *buttons, _gap(), move.target, move.go_to, self._menu
 
     @override
     def _more_row(self) -> QWidget:
@@ -125,7 +154,7 @@ class ClosedLoopGUI(PositionerBaseGUI):
     @override
     def _list_inputs(self) -> Sequence[QWidget]:
         move = self._move
-        own = (move.distance, move.target, move.go_to, move.split, self._menu.button, self._speed)
+        own = (move.distance, move.target, move.go_to, move.split, self._menu, self._speed)
         return *super()._list_inputs(), *own, *self._step_buttons
 
     # Showing
@@ -200,12 +229,16 @@ class ClosedLoopGUI(PositionerBaseGUI):
             lambda consent: self.axis.calibrate(wait=False, consent=consent),
         )
 
-    def _on_end_stop(self, direction: str) -> None:
+    def _on_end_forward(self) -> None:
+        self._drive_to_end(Direction.FORWARD)
+
+    def _on_end_backward(self) -> None:
+        self._drive_to_end(Direction.BACKWARD)
+
+    def _drive_to_end(self, direction: Direction) -> None:
         self.commands.issue(
             f"drive {direction} to the end stop",
-            lambda consent: self.axis.move_to_end_stop(
-                Direction(direction), wait=False, consent=consent
-            ),
+            lambda consent: self.axis.move_to_end_stop(direction, wait=False, consent=consent),
         )
 
     def _on_zero_set(self) -> None:
