@@ -11,6 +11,7 @@ from cosmic.autonomy.bending.fit import measure_fibre
 from cosmic.autonomy.bending.plan import DRY_EI_N_M2, PlannedSpan
 from cosmic.autonomy.bending.result import UN_UM2_PER_N_M2, SpanFit
 from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.handling.approach import STAND_BACK_UM, line_of
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.force_limit import arm_force_limit, put_back
@@ -26,7 +27,6 @@ from cosmic.autonomy.handling.push import (
     span_limits,
 )
 from cosmic.autonomy.handling.put_away import ADHESION
-from cosmic.autonomy.handling.reach import STAND_BACK_UM, line_of
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Yielded
 from cosmic.vico.core.image import CameraImage
 
