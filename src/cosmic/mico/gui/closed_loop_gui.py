@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QToolButton, QVBoxLayout, QWidget
 
@@ -18,6 +18,85 @@ from cosmic.mico.gui.link_switch import LinkSwitch
 from cosmic.mico.gui.move_row import MoveFields
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 from cosmic.mico.hw.interface import Direction
+
+
+class AxisMenu(QObject):
+    """What an axis with sensor can be asked besides moving; each entry only asks, the card acts.
+
+    Signals
+    -------
+    more_toggled(bool)
+        The part with steps and speed shall be shown or hidden.
+    """
+
+    zero_set = Signal()
+    zero_cleared = Signal()
+    reference_requested = Signal()
+    calibrate_requested = Signal()
+    end_stop_requested = Signal(str)
+    more_toggled = Signal(bool)
+
+    def __init__(self, axis_name: str, forward: str, backward: str, parent: QObject) -> None:
+        super().__init__(parent)
+        self.button = named(QToolButton(), "axisMenu")
+        self.button.setText("⋯")
+        tipped(
+            self.button, f"Zero, reference, calibration, end stops, steps and speed: {axis_name}"
+        )
+        self.button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.menu = QMenu(self.button)
+        self.menu.setToolTipsVisible(True)
+        self.button.setMenu(self.menu)
+        styled(self.button, "menu")
+        self.button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
+        self._add(
+            "Set zero here",
+            "Count positions from here; limits stay where they are",
+            self.zero_set.emit,
+        )
+        self._add("Clear zero", "Count positions as the controller does", self.zero_cleared.emit)
+        self.menu.addSeparator()
+        self._add(
+            "Find reference",
+            "Find the reference; may sweep the whole travel",
+            self.reference_requested.emit,
+        )
+        self._add(
+            "Calibrate sensor",
+            "Moves millimetres in both directions",
+            self.calibrate_requested.emit,
+        )
+        self._add(
+            f"To the end stop: {forward}", "Drive forwards until the travel ends", self._on_forward
+        )
+        self._add(
+            f"To the end stop: {backward}",
+            "Drive backwards until the travel ends",
+            self._on_backward,
+        )
+        self.menu.addSeparator()
+        self.more = self._add(
+            "Show steps and speed", "Move by steps or in several steps, and set the speed", None
+        )
+        self.more.setCheckable(True)
+        self.more.toggled.connect(self.more_toggled)
+
+    def _add(self, text: str, tip: str, act: Callable[[], None] | None) -> QAction:
+        action = self.menu.addAction(text)
+        action.setToolTip(tip)
+        if act is not None:
+            action.triggered.connect(act)
+        return action
+
+    def _on_forward(self) -> None:
+        self.end_stop_requested.emit("forward")
+
+    def _on_backward(self) -> None:
+        self.end_stop_requested.emit("backward")
+
+    def action(self, text: str) -> QAction:
+        """Return the entry that begins with `text`."""
+        return next(each for each in self.menu.actions() if each.text().startswith(text))
 
 
 class ClosedLoopGUI(PositionerBaseGUI):
@@ -62,43 +141,14 @@ class ClosedLoopGUI(PositionerBaseGUI):
         self._link.unlink_wanted.connect(self.unlink_wanted)
 
     def _make_menu(self) -> None:
-        """Make what an axis with sensor can be asked besides moving."""
         name, settings = self.settings.name, self.settings
-        tip = f"Zero, reference, calibration, end stops, steps and speed: {name}"
-        self._menu = styled(named(tipped(QToolButton(), tip), "axisMenu"), "menu")
-        self._menu.setText("⋯")
-        self._menu.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        self._menu.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
-        menu = QMenu(self._menu)
-        menu.setToolTipsVisible(True)
-        self._menu.setMenu(menu)
-
-        def add(text: str, tip: str) -> QAction:
-            action = menu.addAction(text)
-            action.setToolTip(tip)
-            return action
-
-        set_zero = add("Set zero here", "Count positions from here; limits stay where they are")
-        set_zero.triggered.connect(self._on_zero_set)
-        clear_zero = add("Clear zero", "Count positions as the controller does")
-        clear_zero.triggered.connect(self._on_zero_cleared)
-        menu.addSeparator()
-        reference = add("Find reference", "Find the reference; may sweep the whole travel")
-        reference.triggered.connect(self._on_reference)
-        calibrate = add("Calibrate sensor", "Moves millimetres in both directions")
-        calibrate.triggered.connect(self._on_calibrate)
-        ahead = add(
-            f"To the end stop: {settings.forward_text}", "Drive forwards until the travel ends"
-        )
-        ahead.triggered.connect(self._on_end_forward)
-        back = add(
-            f"To the end stop: {settings.backward_text}", "Drive backwards until the travel ends"
-        )
-        back.triggered.connect(self._on_end_backward)
-        menu.addSeparator()
-        more = add("Show steps and speed", "Move by steps or in several steps, and set the speed")
-        more.setCheckable(True)
-        more.toggled.connect(self._on_more)
+        self._menu = AxisMenu(name, settings.forward_text, settings.backward_text, self)
+        self._menu.zero_set.connect(self._on_zero_set)
+        self._menu.zero_cleared.connect(self._on_zero_cleared)
+        self._menu.reference_requested.connect(self._on_reference)
+        self._menu.calibrate_requested.connect(self._on_calibrate)
+        self._menu.end_stop_requested.connect(self._on_end_stop)
+        self._menu.more_toggled.connect(self._on_more)
 
     def _make_speed(self) -> None:
         low, high = self.axis.details.frequency_range_hz
@@ -121,7 +171,7 @@ class ClosedLoopGUI(PositionerBaseGUI):
     def _second_row(self) -> Sequence[QWidget]:
         move = self._move
         buttons = (self._backward, move.distance, self._forward)
-        return *buttons, _gap(), move.target, move.go_to, self._menu
+        return *buttons, _gap(), move.target, move.go_to, self._menu.button
 
     @override
     def _more_row(self) -> QWidget:
@@ -154,7 +204,7 @@ class ClosedLoopGUI(PositionerBaseGUI):
     @override
     def _list_inputs(self) -> Sequence[QWidget]:
         move = self._move
-        own = (move.distance, move.target, move.go_to, move.split, self._menu, self._speed)
+        own = (move.distance, move.target, move.go_to, move.split, self._menu.button, self._speed)
         return *super()._list_inputs(), *own, *self._step_buttons
 
     # Showing
@@ -229,16 +279,12 @@ class ClosedLoopGUI(PositionerBaseGUI):
             lambda consent: self.axis.calibrate(wait=False, consent=consent),
         )
 
-    def _on_end_forward(self) -> None:
-        self._drive_to_end(Direction.FORWARD)
-
-    def _on_end_backward(self) -> None:
-        self._drive_to_end(Direction.BACKWARD)
-
-    def _drive_to_end(self, direction: Direction) -> None:
+    def _on_end_stop(self, direction: str) -> None:
         self.commands.issue(
             f"drive {direction} to the end stop",
-            lambda consent: self.axis.move_to_end_stop(direction, wait=False, consent=consent),
+            lambda consent: self.axis.move_to_end_stop(
+                Direction(direction), wait=False, consent=consent
+            ),
         )
 
     def _on_zero_set(self) -> None:
