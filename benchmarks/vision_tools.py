@@ -18,11 +18,11 @@ from cosmic.twin.settings import shipped_settings
 from cosmic.vico.core.background import Background
 from cosmic.vico.core.calibration_fit import Sighting, fit_map, fit_rotation
 from cosmic.vico.core.focus import FocusSearch, sharpness
-from cosmic.vico.core.levels import measure_levels
 from cosmic.vico.core.vision.matching import displacement
 from cosmic.vico.core.vision.tips import find_gripper, find_probe
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen
 from cosmic.vico.core.vision.tracking import TemplateTracker, TrackState
+from cosmic.vico.gui.levels import histogram
 from cosmic.vico.hw.interface import Frame, PixelFormat, Roi
 
 NAME = "vision_tools"
@@ -266,11 +266,11 @@ def costs(runs: int) -> list[Figure]:
     part = Roi(600, 400, 400, 400)
     asked = {
         "levels and stretch, 8 bit": (
-            lambda: measure_levels(image, PixelFormat.MONO8).stretch(),
+            lambda: histogram(image, PixelFormat.MONO8.full_scale).levels(),
             1.0,
         ),
         "levels and stretch, 12 bit": (
-            lambda: measure_levels(deep, PixelFormat.MONO12).stretch(),
+            lambda: histogram(deep, PixelFormat.MONO12.full_scale).levels(),
             1.0,
         ),
         "flat field, 8 bit": (lambda: background.correct(frame), None),

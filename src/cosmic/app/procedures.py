@@ -4,9 +4,10 @@ import platform as computer
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from typing_extensions import override
+
 from cosmic.app.platform import Platform, stopped_since
 from cosmic.app.provenance import commit, provenance_of
-from cosmic.app.twin_plates import TwinPlates
 from cosmic.autonomy.calibrating.registry import CalibrationRegistry
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.opening import CampaignHost, open_campaign, read_recipe
@@ -16,11 +17,14 @@ from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.autonomy.handling.context import Applications, HandlingContext
 from cosmic.autonomy.handling.plate_change import PlateHandler
 from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.procedures.operation import Awaited
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.shipped.calibrate import build_calibrate, calibration_names
 from cosmic.frame.arguments import check_named, checked
-from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.clock import Clock
+from cosmic.frame.errors import ConfigError, NotAvailable, OperationCancelled
 from cosmic.frame.version import __version__
+from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
 
 
@@ -86,3 +90,52 @@ def calibration_on(
     procedure, work = build_calibrate(settings, zooms=zooms), HandlingContext.on(rig, settings)
     work.command_as(procedure.name, rig.mico)
     return procedure, work
+
+
+class TwinPlates(PlateHandler):
+    """Puts plates on the table of a scene, by its clock, as somebody would: it takes a while."""
+
+    name = "simulated handler"
+
+    def __init__(self, scene: Scene, clock: Clock) -> None:
+        self._scene = scene
+        self._clock = clock
+
+    @override
+    def change(self, plate: int) -> Awaited:
+        self._scene.check_plate_change()
+        return _Exchange(self._scene, self._clock)
+
+    @override
+    def put(self, plate: int) -> None:
+        self._scene.change_plate()
+
+    @override
+    def restore(self, plate: int) -> None:
+        while self._scene.plate < plate - 1:
+            self._scene.change_plate()
+
+
+class _Exchange:
+    """One change of the plate under way, until the platform's clock says that it is over."""
+
+    def __init__(self, scene: Scene, clock: Clock) -> None:
+        self._scene = scene
+        self._clock = clock
+        self._until_s = clock.now_s() + scene.settings.plate.exchange_s
+        self._cancelled = False
+
+    @property
+    def done(self) -> bool:
+        """True when the time is over, or somebody ended it."""
+        return self._cancelled or self._clock.now_s() >= self._until_s
+
+    def wait(self, timeout_s: float | None = None) -> object:  # noqa: ARG002 - by the protocol
+        """Put the plate there; raises where it was ended before."""
+        if self._cancelled:
+            raise OperationCancelled("the plate was not changed")
+        return self._scene.change_plate()
+
+    def cancel(self) -> None:
+        """Leave the old plate there."""
+        self._cancelled = True

@@ -44,6 +44,8 @@ class ForceSide:
     sensors : dict of str to ForceSensor
         As twin.toml names them. Reading one is all that an acquisition board may do here; the
         rest is the truth, for images, logs and tests.
+    timeline : Timeline
+        What was felt when, as it is worked out.
     offsets : ToolOffsets
         How far tools are from where the drawing has them.
 
@@ -89,7 +91,7 @@ class ForceSide:
             for name, each in settings.force_sensors.items()
         }
         behind = [each for each in self.sensors.values() if each.settings.mounted_on]
-        self._timeline = Timeline(
+        self.timeline = Timeline(
             self._workspace,
             stages,
             settings.contact.step_s,
@@ -105,26 +107,14 @@ class ForceSide:
         times_s : ndarray, shape (n,), float64
             Rising; not later than now, and not more than some seconds ago.
         """
-        return self._timeline.force_un(times_s)
-
-    def _signal_un(self, times_s: Floats) -> Floats:
-        return self._timeline.signal_un(times_s)
+        return self.timeline.force_un(times_s)
 
     def moment(self, now_s: float) -> Moment:
         """Return the whole truth now: force, what touches where, each fibre's state."""
-        return self._timeline.moment(now_s)
+        return self.timeline.moment(now_s)
 
-    @property
-    def unseen(self) -> int:
-        """How many movements of one stage nobody has looked at yet, at most."""
-        return self._timeline.unseen
-
-    def keep_up(self, now_s: float) -> None:
-        """Go some way towards now if nobody has looked for long, so that no backlog grows.
-
-        For who has time to spare and holds no lock that others wait for.
-        """
-        self._timeline.keep_up(now_s)
+    def _signal_un(self, times_s: Floats) -> Floats:
+        return self.timeline.signal_un(times_s)
 
     def check_plate_change(self, now_s: float) -> None:
         """Check that the plate can be taken away now.
@@ -134,7 +124,7 @@ class ForceSide:
         NotAvailable
             Something is held, or jaws stand too low.
         """
-        self._timeline.change(now_s, self._workspace.check_plate_change)
+        self.timeline.change(now_s, self._workspace.check_plate_change)
 
     def change_plate(self, now_s: float, number: int, fibres: tuple[FibreSettings, ...]) -> None:
         """Take everything off the plate, and put another with other fibres there.
@@ -148,14 +138,10 @@ class ForceSide:
         def change(values: Mapping[str, float]) -> None:
             self._workspace.change_plate(values, number, fibres)
 
-        self._timeline.change(now_s, change)
-
-    def finish(self, now_s: float) -> None:
-        """Tell the truth what lasts until the end, which is now."""
-        self._timeline.finish(now_s)
+        self.timeline.change(now_s, change)
 
     def tips(self, now_s: float) -> dict[str, Point]:
-        """Return where the tips of the tools are, um, world; see `Workplace.tips`."""
+        """Return where the tips of the tools are, um, world; see `Workspace.tips`."""
         return self._workspace.tips(self.positions(now_s), now_s)
 
     def positions(self, at_s: float) -> dict[str, float]:

@@ -265,7 +265,7 @@ class Scene:
         """End the truth, and let go of what images are drawn with; harmless the second time."""
         # Where nobody asked for forces, to go on to the end takes some 50 ms: for a listener only.
         if self.force_side is not None and self._truth is not NO_TRUTH:
-            self.force_side.finish(self.clock.now_s())
+            self.force_side.timeline.finish(self.clock.now_s())
         self._truth.record(self.clock.now_s(), "end")
         self._truth.close()
         if self.optics is not None:
@@ -308,9 +308,9 @@ class Scene:
         self.force_side.check_plate_change(self.clock.now_s())
 
     def keep_up(self) -> None:
-        """Do some of the physics that nobody has asked for yet; see `ForceSide.keep_up`."""
+        """Do some of the physics that nobody has asked for yet; see `Timeline.keep_up`."""
         if self.force_side is not None:
-            self.force_side.keep_up(self.clock.now_s())
+            self.force_side.timeline.keep_up(self.clock.now_s())
 
     def truth(self) -> dict[str, float]:
         """Return where every stage truly is now, in its unit: for views and logs, not control."""

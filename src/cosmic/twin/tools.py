@@ -1,4 +1,4 @@
-"""The grippers as the fibres meet them, and the file that says where everything is."""
+"""The tools as the fibres meet them, and the skeleton of all that moves, read from its URDF."""
 
 from collections.abc import Mapping
 from pathlib import Path

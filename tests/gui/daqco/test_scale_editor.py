@@ -5,8 +5,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialogButtonBox
 
 from cosmic.daqco.core.settings import ScaleSettings
-from cosmic.daqco.gui.polynomial import formula
-from cosmic.daqco.gui.scale_editor import ScaleEditor
+from cosmic.daqco.gui.scale_editor import ScaleEditor, formula
 
 Button = QDialogButtonBox.StandardButton
 SCALES = (

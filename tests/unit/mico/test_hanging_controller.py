@@ -142,7 +142,7 @@ def test_a_stop_soon_after_the_library_began_to_hang_returns(hang):
         assert returned
 
 
-def test_a_stop_that_the_library_does_not_carry_out_is_reported_though_its_caller_hangs(hang, caplog):
+def test_a_stop_that_the_library_does_not_carry_out_is_reported(hang, caplog):
     with mico(TWO, instant=False) as (rig, controller):
         hang.into(controller, "stop")
         manager = rig.application.manager

@@ -59,12 +59,6 @@ def test_steps_are_the_points_with_names_in_order() -> None:
     assert [each.name for each in TABLE.steps] == ["0.5x", "8x"]
 
 
-def test_a_calibration_replaces_a_point_or_adds_one() -> None:
-    better = TABLE.with_point(ZoomPoint(6000, 2.0, 2.1))
-    assert better.scale_um_px(6000) == 2.1
-    assert len(better.points) == 3 and TABLE.scale_um_px(6000) == 2.0
-
-
 @pytest.mark.parametrize(
     "points",
     [

@@ -35,6 +35,7 @@ from cosmic.mico.gui.detour_request import Goal
 from cosmic.mico.gui.key_names import key_text
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.gui.move_row import StepField
+from cosmic.mico.gui.poses_box import ReplacedPose
 from cosmic.mico.gui.state_feed import StateFeed
 from cosmic.mico.hw.interface import PositionerKind
 
@@ -150,7 +151,7 @@ class ToolPanel(QWidget):
         self._steps: dict[str, float] = {}
         self._stopped = ""
         self._verdict: MoveVerdict | None = None
-        self._replaced = ""  # the pose that was said to be there already
+        self._replacing = ReplacedPose(self._mico, "Enter")
         self._last: tuple[str, Callable[[], None]] | None = None
         self._shown: Shown = USUAL
         self._detour_by_click: Callable[[], None] | None = None
@@ -527,22 +528,20 @@ class ToolPanel(QWidget):
             self._refuse(progress.error)
 
     def _on_keep(self) -> None:
-        self._replaced = ""
+        self._replacing.forget()
         self.pose_name.setVisible(not self.pose_name.isVisible())
         self.pose_name.setFocus()
 
     def _on_pose_named(self) -> None:
         name = self.pose_name.text().strip()
-        if name in self._mico.poses.names and name != self._replaced:
-            self._replaced = name
-            self._refuse(f"There is a pose {name} already: Enter again replaces it")
+        if question := self._replacing.question(name):
+            self._refuse(question)
             return
         try:
             self._mico.poses.teach(name, list(self.axes))
         except CosmicError as exc:
             self._refuse(str(exc))
             return
-        self._replaced = ""
         self.pose_name.clear()
         self.pose_name.hide()
         self.refresh_poses()

@@ -12,7 +12,7 @@ from cosmic.autonomy.calibrating.focusing import (
     seek_from_below,
 )
 from cosmic.autonomy.handling.context import HandlingContext
-from cosmic.autonomy.handling.jaws import in_step, move_jaws, zero_jaws
+from cosmic.autonomy.handling.jaws import in_step, move_jaws, open_jaws, zero_jaws
 from cosmic.autonomy.handling.prepare import clear_image, zoom_to
 from cosmic.autonomy.procedures.operation import Steps
 from cosmic.autonomy.stage_procedure import LARGEST_PART
@@ -62,7 +62,7 @@ class CalibrateZooms(Calibrated):
         finally:
             work.shared.zoomed = None
         yield from seek_from_below(work, begun)
-        yield from move_jaws(work, work.settings.grasp.gap_um - (work.gap_um or 0.0))
+        yield from open_jaws(work)
         yield from zoom_to(work, work.settings.zoom)
         how = f"9 positions at each of {len(steps)} steps"
         self.kept(work, worst, "px", settings.residual_px, values=values, how=how)

@@ -155,17 +155,10 @@ class Control:
         settings = parts.settings(travel_um=travel_um, ramp_un_s=ramp_un_s)
         limits = parts.force_limits(channel, setpoint_un, limit_un)
         source = parts.channel(channel, settings, limits)
-        if source.unit != "uN":
-            raise ConfigError(f"{channel} is measured in {source.unit}; a force must be in uN")
-        goal = _force_goal(channel, setpoint_un, limits, direction, settings, tolerance_un)
+        goal = _force_goal(source, setpoint_un, limits, direction, settings, tolerance_un)
+        law, sink = ForceServo(goal, settings, gains), parts.force_sink(axis, settings)
         return self._begin(
-            source,
-            ForceServo(goal, settings, gains),
-            parts.force_sink(axis, settings),
-            setpoint_un,
-            settings,
-            tolerance=goal.tolerance_un,
-            limits=limits,
+            source, law, sink, setpoint_un, settings, tolerance=goal.tolerance_un, limits=limits
         )
 
     def hold(
@@ -289,7 +282,7 @@ class Control:
 
 
 def _force_goal(
-    channel: str,
+    source: Source,
     setpoint_un: float,
     limits: tuple[float, float],
     direction: int,
@@ -301,13 +294,15 @@ def _force_goal(
     Raises
     ------
     ConfigError
-        A number makes no sense.
+        It is no force, or a number makes no sense.
     LimitError
         The set point does not lie inside the limits.
     """
+    if source.unit != "uN":
+        raise ConfigError(f"{source.name} is measured in {source.unit}; a force must be in uN")
     if direction not in (1, -1):
         raise ConfigError(f"direction must be 1 or -1, got {direction!r}")
-    check_inside(channel, "uN", setpoint_un, limits)
+    check_inside(source.name, "uN", setpoint_un, limits)
     wanted = settings.tolerance(setpoint_un) if tolerance_un is None else tolerance_un
     if not 0.0 < wanted < math.inf:
         raise ConfigError(f"tolerance_un must be a number above 0, got {tolerance_un!r}")

@@ -9,10 +9,10 @@ import numpy as np
 from typing_extensions import override
 
 from cosmic.autonomy.bending.curved import NaturalShape
+from cosmic.autonomy.handling.approach import LOST, line_of
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import along, arc_lengths
-from cosmic.autonomy.handling.reach import LOST, line_of
 from cosmic.autonomy.handling.sight import trace_along
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps, Yielded
 from cosmic.vico.core.image import CameraImage

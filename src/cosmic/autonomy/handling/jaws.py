@@ -67,6 +67,11 @@ def in_step(work: HandlingContext) -> bool:
     return known and abs((counted or 0.0) - (work.gap_um or 0.0)) < COUNT_UM
 
 
+def open_jaws(work: HandlingContext) -> Steps:
+    """Open the jaws as wide as they stand before a fibre, from where they are counted to be."""
+    yield from move_jaws(work, work.settings.grasp.gap_um - (work.gap_um or 0.0))
+
+
 def move_jaws(work: HandlingContext, by_um: float, *, frequency_hz: float | None = None) -> Steps:
     """Open the jaws, or close them: open loop, a step at full voltage is what the file says.
 

@@ -8,7 +8,7 @@ from typing_extensions import override
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.grasp import in_jaws, seen_at
 from cosmic.autonomy.handling.held_fibre import HeldFibre
-from cosmic.autonomy.handling.jaws import move_jaws
+from cosmic.autonomy.handling.jaws import move_jaws, open_jaws
 from cosmic.autonomy.handling.prepare import retract_probe
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.vico.core.image import CameraImage
@@ -60,8 +60,7 @@ class Release(FibreOperation):
     @override
     def steps(self, work: HandlingContext) -> Steps:
         positions, forward = work.settings.places, work.jaws.forward
-        gap = work.gap_um or 0.0
-        yield from move_jaws(work, work.settings.grasp.gap_um - gap)
+        yield from open_jaws(work)
         with work.mico.collision.contact("grasp"):
             yield work.go_up(positions.travel_um)
         # Each time elsewhere: what is seen may lie on the plate and not hang at the jaws.

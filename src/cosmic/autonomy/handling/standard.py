@@ -4,12 +4,12 @@ from typing import Final
 
 from typing_extensions import override
 
+from cosmic.autonomy.handling.approach import line_of
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.grasp import in_jaws, seen_at
 from cosmic.autonomy.handling.plate import along
 from cosmic.autonomy.handling.prepare import clear_image, retract_probe
 from cosmic.autonomy.handling.put_away import ADHESION, Wipe
-from cosmic.autonomy.handling.reach import line_of
 from cosmic.autonomy.handling.sight import find_seen
 from cosmic.autonomy.handling.survey import approaches_of, look, take
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps

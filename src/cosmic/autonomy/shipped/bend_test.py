@@ -3,6 +3,15 @@
 The transport goes the same way and measures nothing.
 """
 
+from cosmic.autonomy.handling.approach import (
+    TIP_NOT_SEEN,
+    Approach,
+    CloseJaws,
+    FindAgain,
+    Refine,
+    Shift,
+    Turn,
+)
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.grasp import MISSED, Carry, TestGrasp
 from cosmic.autonomy.handling.guided_move import OUT_OF_SIGHT, STRAYED
@@ -25,15 +34,6 @@ from cosmic.autonomy.handling.put_away import (
     Release,
     ToBin,
     Wipe,
-)
-from cosmic.autonomy.handling.reach import (
-    TIP_NOT_SEEN,
-    Approach,
-    CloseJaws,
-    FindAgain,
-    Refine,
-    Shift,
-    Turn,
 )
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.standard import (

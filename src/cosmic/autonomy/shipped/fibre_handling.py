@@ -13,21 +13,10 @@ from cosmic.autonomy.handling.context import Applications, HandlingContext, visi
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.marked import MarkedFibre, approach_to
 from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.handling.single import CloseGently, PushToForce, is_at_probe
+from cosmic.autonomy.handling.single_operations import CloseGently, PushToForce, is_at_probe
 from cosmic.autonomy.procedures.failures import STOPPED
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun, RunState
-from cosmic.autonomy.shipped.single import (
-    build_bring,
-    build_carry_back,
-    build_close_gently,
-    build_lay_back,
-    build_measure,
-    build_push,
-    build_put_away,
-    build_retract,
-    build_take,
-)
 from cosmic.autonomy.shipped.single_operation import (
     IN_DOUBT,
     PUSHES,
@@ -42,6 +31,17 @@ from cosmic.autonomy.shipped.single_operation import (
 
 # Recorded procedures that were written as scripts take it from here.
 from cosmic.autonomy.shipped.single_operation import SingleOperation as SingleOperation
+from cosmic.autonomy.shipped.single_procedures import (
+    build_bring,
+    build_carry_back,
+    build_close_gently,
+    build_lay_back,
+    build_measure,
+    build_push,
+    build_put_away,
+    build_retract,
+    build_take,
+)
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.events import Event, Unsubscribe
 from cosmic.mico.api.application import MicoApplication

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from cosmic.autonomy.handling.approach import Turn
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.dual_gripper import (
     CarryInTurn,
@@ -34,7 +35,6 @@ from cosmic.autonomy.handling.put_away import (
     Release,
     ToBin,
 )
-from cosmic.autonomy.handling.reach import Turn
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.standard import LookForStandard
 from cosmic.autonomy.handling.survey import Survey

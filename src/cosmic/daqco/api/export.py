@@ -14,7 +14,7 @@ from typing import Final, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.daqco.api.export_targets import (
+from cosmic.daqco.api.export_formats import (
     CsvTarget,
     Target,
     TdmsTarget,

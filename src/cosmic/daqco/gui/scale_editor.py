@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 import pyqtgraph as pg
+from pydantic import ValidationError
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QDialogButtonBox,
@@ -17,11 +18,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from cosmic.daqco.core.scale import LARGEST_DEGREE, VOLTS
+from cosmic.daqco.core.scale import LARGEST_COEFFICIENT, LARGEST_DEGREE, VOLTS, Scale
 from cosmic.daqco.core.settings import EXTREMES_V, ScaleSettings
 from cosmic.daqco.gui.dialog import FieldDialog, button_box
 from cosmic.daqco.gui.plot.units import display_unit
-from cosmic.daqco.gui.polynomial import checked, coefficient_problem, formula, oddity
 from cosmic.daqco.gui.value_field import ValueField
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.gui.build import named, push_button, tipped
@@ -31,6 +31,32 @@ from cosmic.frame.gui.refusal import show_refusal
 from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
 
 POINTS = 401
+_RAISED: Final = "⁰¹²³⁴⁵⁶⁷⁸⁹"
+Button = QDialogButtonBox.StandardButton
+
+
+def formula(coefficients: tuple[float, ...], unit: str) -> str:
+    """Return a polynomial as text, such as "value in µN = 0.5 + 20 V − 0.1 V²"."""
+    terms: list[str] = []
+    for power, coefficient in enumerate(coefficients):
+        if coefficient == 0.0 and len(coefficients) > 1:
+            continue
+        sign = "−" if coefficient < 0.0 else "+" if terms else ""
+        volts = "" if power == 0 else " V" if power == 1 else f" V{_RAISED[power]}"
+        gap = " " if terms else ""
+        terms.append(f"{sign}{gap}{abs(coefficient):g}{volts}")
+    return f"value in {display_unit(unit)} = {' '.join(terms) or '0'}"
+
+
+def oddity(scale: ScaleSettings) -> str:
+    """Return what the operator may not have meant; empty when there is nothing."""
+    values = scale.scale().apply(np.linspace(*EXTREMES_V, POINTS))
+    steps = np.diff(values)
+    if not np.any(values != values[0]):
+        return "every voltage gives the same value"
+    if np.any(steps > 0.0) and np.any(steps < 0.0):
+        return "the scale is not monotonic: two voltages give the same value"
+    return ""
 
 
 class ScalePlot(QWidget):
@@ -115,10 +141,6 @@ class ScalePlot(QWidget):
         value = float(scale.scale().apply([volts])[0])
         self.result.setText(f"{value:.6g} {display_unit(scale.unit)}")
         self.point.setData([volts], [value])
-
-
-_RAISED: Final = "⁰¹²³⁴⁵⁶⁷⁸⁹"
-Button = QDialogButtonBox.StandardButton
 
 
 class ScaleView(FieldDialog):
@@ -335,3 +357,27 @@ class ScaleEditor(FieldDialog):
         renamed = {old: new.name for old, new in pairs if old and old != new.name}
         self.scales_accepted.emit(tuple(self._scales), renamed)
         self.accept()
+
+
+def checked(name: str, unit: str, coefficients: tuple[float, ...]) -> ScaleSettings:
+    """Return a scale that the program can use.
+
+    Raises
+    ------
+    ConfigError
+        It has no name, no unit or no coefficients, or one that is not finite or far too large.
+    """
+    Scale(name, unit, coefficients)
+    if not unit.strip():
+        raise ConfigError(f"scale {name!r}: say in which unit its values are")
+    try:
+        return ScaleSettings(name=name.strip(), unit=unit.strip(), coefficients=coefficients)
+    except ValidationError as exc:
+        raise ConfigError(f"scale {name!r}: {exc.errors()[0]['msg']}") from None
+
+
+def coefficient_problem(value: float) -> str:
+    """Return why a number cannot be a coefficient; empty when it can."""
+    if abs(value) <= LARGEST_COEFFICIENT:
+        return ""
+    return f"give a number up to {LARGEST_COEFFICIENT:g}"

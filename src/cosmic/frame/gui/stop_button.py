@@ -35,21 +35,17 @@ class StopButton(QPushButton):
         self.setMinimumHeight(STOP_HEIGHT_PX)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.set_key_text(key_text)
-        self._pressed_ms = 0
-        self.pressed.connect(self.stop_requested)
-        app = QApplication.instance()
-        if isinstance(app, QApplication):
-            ApplicationEvents.of(app).add(self, self._on_any_press, QMouseEvent)
-
-    def set_key_text(self, key_text: str) -> None:
-        """Write `key_text` on the button."""
         self.setText(f"STOP  {key_text}".rstrip())
         self.setToolTip(
             f"Stop every movement now and keep it stopped until Reset ({key_text}, from any "
             "window; Esc too, where it has nothing to cancel)"
         )
         self.setAccessibleName("Stop all movement")
+        self._pressed_ms = 0
+        self.pressed.connect(self.stop_requested)
+        app = QApplication.instance()
+        if isinstance(app, QApplication):
+            ApplicationEvents.of(app).add(self, self._on_any_press, QMouseEvent)
 
     def _on_any_press(self, watched: QObject, event: QEvent) -> bool:
         """Stop where a menu or the list of a box has a press that is on the button."""

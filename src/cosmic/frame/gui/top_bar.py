@@ -356,10 +356,6 @@ class TopBar(QWidget):
         """The line shown."""
         return self._message.text()
 
-    def set_title(self, title: str) -> None:
-        """Name the program or the station."""
-        self._title.setText(title)
-
     def set_simulated(self, simulated: bool) -> None:
         """Show the SIMULATED sign, or that real hardware is driven."""
         self._simulated.setText("SIMULATED" if simulated else "HARDWARE")
@@ -451,10 +447,6 @@ class TopBar(QWidget):
         same_theme, self._theme_then = theme == self._theme_then or self._latched, theme
         unseen = set(self._normal.findChildren(QWidget)) if same_theme else set()
         restyle(self, *(each for each in self.findChildren(QWidget) if each not in unseen))
-
-    def set_stop_key(self, key_text: str) -> None:
-        """Write another key on the STOP button."""
-        self._stop.set_key_text(key_text)
 
 
 def _short(names: Collection[str]) -> str:

@@ -3,21 +3,100 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QToolButton, QVBoxLayout, QWidget
 
 from cosmic.frame.errors import CosmicError, MoveRefused
-from cosmic.frame.gui.build import named, push_button
+from cosmic.frame.gui.build import named, push_button, styled, tipped
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override
 from cosmic.frame.units import format_quantity
 from cosmic.mico.core.motion.positioner import PositionerState
-from cosmic.mico.gui.axis_menu import AxisMenu
 from cosmic.mico.gui.link_switch import LinkSwitch
 from cosmic.mico.gui.move_row import MoveFields
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 from cosmic.mico.hw.interface import Direction
+
+
+class AxisMenu(QObject):
+    """What an axis with sensor can be asked besides moving; each entry only asks, the card acts.
+
+    Signals
+    -------
+    more_toggled(bool)
+        The part with steps and speed shall be shown or hidden.
+    """
+
+    zero_set = Signal()
+    zero_cleared = Signal()
+    reference_requested = Signal()
+    calibrate_requested = Signal()
+    end_stop_requested = Signal(str)
+    more_toggled = Signal(bool)
+
+    def __init__(self, axis_name: str, forward: str, backward: str, parent: QObject) -> None:
+        super().__init__(parent)
+        self.button = named(QToolButton(), "axisMenu")
+        self.button.setText("⋯")
+        tipped(
+            self.button, f"Zero, reference, calibration, end stops, steps and speed: {axis_name}"
+        )
+        self.button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.menu = QMenu(self.button)
+        self.menu.setToolTipsVisible(True)
+        self.button.setMenu(self.menu)
+        styled(self.button, "menu")
+        self.button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
+        self._add(
+            "Set zero here",
+            "Count positions from here; limits stay where they are",
+            self.zero_set.emit,
+        )
+        self._add("Clear zero", "Count positions as the controller does", self.zero_cleared.emit)
+        self.menu.addSeparator()
+        self._add(
+            "Find reference",
+            "Find the reference; may sweep the whole travel",
+            self.reference_requested.emit,
+        )
+        self._add(
+            "Calibrate sensor",
+            "Moves millimetres in both directions",
+            self.calibrate_requested.emit,
+        )
+        self._add(
+            f"To the end stop: {forward}", "Drive forwards until the travel ends", self._on_forward
+        )
+        self._add(
+            f"To the end stop: {backward}",
+            "Drive backwards until the travel ends",
+            self._on_backward,
+        )
+        self.menu.addSeparator()
+        self.more = self._add(
+            "Show steps and speed", "Move by steps or in several steps, and set the speed", None
+        )
+        self.more.setCheckable(True)
+        self.more.toggled.connect(self.more_toggled)
+
+    def _add(self, text: str, tip: str, act: Callable[[], None] | None) -> QAction:
+        action = self.menu.addAction(text)
+        action.setToolTip(tip)
+        if act is not None:
+            action.triggered.connect(act)
+        return action
+
+    def _on_forward(self) -> None:
+        self.end_stop_requested.emit("forward")
+
+    def _on_backward(self) -> None:
+        self.end_stop_requested.emit("backward")
+
+    def action(self, text: str) -> QAction:
+        """Return the entry that begins with `text`."""
+        return next(each for each in self.menu.actions() if each.text().startswith(text))
 
 
 class ClosedLoopGUI(PositionerBaseGUI):

@@ -20,6 +20,33 @@ from cosmic.mico.core.settings import GroupSettings
 ALL: Final = "all axes"
 
 
+class ReplacedPose:
+    """Asks once before a pose is taught over another of its name.
+
+    Parameters
+    ----------
+    again : str
+        What is done a second time to replace it.
+    """
+
+    def __init__(self, mico: Mico, again: str) -> None:
+        self._mico = mico
+        self._again = again
+        self._asked = ""
+
+    def question(self, name: str) -> str:
+        """Return what is to be said before `name` is taught; empty where it may be."""
+        if name in self._mico.poses.names and name != self._asked:
+            self._asked = name
+            return f"There is a pose {name} already: {self._again} again replaces it"
+        self.forget()
+        return ""
+
+    def forget(self) -> None:
+        """Ask again, also about the last name."""
+        self._asked = ""
+
+
 class PosesBox(QWidget):
     """The named poses of the platform, and what can be done with them.
 
@@ -48,7 +75,7 @@ class PosesBox(QWidget):
         self.group.addItems([ALL, *(each.title for each in self._settings_groups())])
         self.teach = named(push_button("Teach", "Keep the positions of the axes now"), "teachPose")
         self.message = ElidedLabel()
-        self._replaced = ""  # the pose that was said to be there already
+        self._replacing = ReplacedPose(mico, "Teach")
         self._arrange()
         self.go.clicked.connect(lambda: self._go(around=False))
         self.around.clicked.connect(lambda: self._go(around=True))
@@ -96,11 +123,9 @@ class PosesBox(QWidget):
     def _on_teach(self) -> None:
         name, group = self.name.text().strip(), self.group.currentText()
         poses, axes = self._mico.poses, None if group == ALL else group
-        if name in poses.names and name != self._replaced:
-            self._replaced = name
-            self.message.set_text(f"There is a pose {name} already: Teach again replaces it")
+        if question := self._replacing.question(name):
+            self.message.set_text(question)
             return
-        self._replaced = ""
         self._mico.carry_out(lambda: poses.teach(name, axes), self._taught)
 
     def _on_taught(self, pose: Pose | None, error: CosmicError | None) -> None:

@@ -212,11 +212,6 @@ def received(sent: object) -> ReceivedImage | None:
     return sent.received() if isinstance(sent, SentImage) else None
 
 
-def received_seen(sent: object) -> Seen | None:
-    """Return what was seen, where it is that."""
-    return sent.received() if isinstance(sent, SentSeen) else None
-
-
 def same_point(one_um: Sequence[float], other_um: Sequence[float], within_um: float) -> bool:
     """Return whether two points are the same but for `within_um`."""
     return all(abs(a - b) <= within_um for a, b in zip(one_um, other_um, strict=True))

@@ -10,7 +10,6 @@ import numpy.typing as npt
 from typing_extensions import override
 
 from cosmic.frame.errors import ConfigError
-from cosmic.vico.core.levels import FULL_SCALE
 from cosmic.vico.hw.interface import Frame, FrameStatus, PixelFormat, Pixels
 
 MOST_FRAMES: Final = 1000
@@ -136,7 +135,7 @@ class Background:
             raise ConfigError(reason)
         depth = cv2.CV_8U if frame.data.dtype == np.uint8 else cv2.CV_16U
         corrected = cast("Pixels", cv2.multiply(frame.data, field.gain, dtype=depth))
-        full_scale = FULL_SCALE[frame.pixel_format]
+        full_scale = frame.pixel_format.full_scale
         if full_scale not in (255, 65535):
             np.minimum(corrected, full_scale, out=corrected)
         corrected.flags.writeable = False

@@ -36,7 +36,7 @@ logger = logging.getLogger(__name__)
 Viewer = tuple[Callable[[CameraImage], object], Callable[[], bool]]
 
 
-class LiveView:
+class LiveView(InboxReader[CameraImage]):
     """Corrects the newest image and hands it on in a thread of its own, while it is wanted.
 
     Parameters
@@ -48,11 +48,11 @@ class LiveView:
     def __init__(
         self, name: str, correct: Callable[[CameraImage], CameraImage], policy: FailurePolicy
     ) -> None:
+        self._newest: Backlog[CameraImage] = Backlog(Rule.LATEST)
+        super().__init__(f"view of {name}", policy, self._newest, self._view)
         self._correct = correct
         self._lock = Lock()
         self._viewers: tuple[Viewer, ...] = ()
-        self._newest: Backlog[CameraImage] = Backlog(Rule.LATEST)
-        self._thread = InboxReader(f"view of {name}", policy, self._newest, self._view)
 
     def subscribe(
         self, receiver: Callable[[CameraImage], object], wanted: Callable[[], bool]
@@ -74,18 +74,6 @@ class LiveView:
             return
         if any(wanted() for _, wanted in self._viewers):
             self._newest.put(image)
-
-    def start(self) -> None:
-        """Begin to hand on what comes."""
-        self._thread.start()
-
-    def request_end(self) -> None:
-        """Ask the thread to end; returns at once."""
-        self._thread.request_end()
-
-    def join(self) -> None:
-        """Wait until it has ended."""
-        self._thread.join()
 
     def _view(self, image: CameraImage) -> None:
         shown = self._correct(image)

@@ -120,11 +120,6 @@ class ZoomScale:
         part = math.log(zoom / one.zoom) / math.log(other.zoom / one.zoom)
         return round(one.counts + part * (other.counts - one.counts))
 
-    def with_point(self, point: ZoomPoint) -> "ZoomScale":
-        """Return a table with a point more, or another one at its position; see `ZoomScale`."""
-        kept = [each for each in self._points if each.counts != point.counts]
-        return ZoomScale((*kept, point))
-
     def _between(self, counts: float, values: Sequence[float]) -> float | None:
         points = self._points
         if not points or not points[0].counts <= counts <= points[-1].counts:

@@ -27,7 +27,6 @@ from cosmic.vico.core.image import CameraImage
 from cosmic.vico.gui.levels import (
     Levels,
     colour_image,
-    full_scale,
     index_table,
     indices,
     palette,
@@ -80,7 +79,7 @@ class CameraImageItem:
         """Show an image; True when it has another shape than the one before."""
         before, self._data = self._data, image.data
         reshaped = before is None or before.shape != image.data.shape
-        full = full_scale(image.frame.pixel_format)
+        full = image.frame.pixel_format.full_scale
         if full != self.full:
             share = full / self.full
             self.full, self._index = full, index_table(full)

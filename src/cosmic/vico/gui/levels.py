@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.vico.hw.interface import PixelFormat, Pixels
+from cosmic.vico.hw.interface import Pixels
 
 BINS: Final = 256
 SAMPLES: Final = 120_000
@@ -14,20 +14,7 @@ OVER_RGB: Final = (213, 94, 0)
 UNDER_RGB: Final = (86, 180, 233)
 GREYED: Final = 0.45
 
-_FULL: Final = {
-    PixelFormat.MONO8: 255,
-    PixelFormat.MONO10: 1023,
-    PixelFormat.MONO12: 4095,
-    PixelFormat.MONO16: 65535,
-    PixelFormat.RGB8: 255,
-}
-
 Table = npt.NDArray[np.uint8]
-
-
-def full_scale(pixel_format: PixelFormat) -> int:
-    """Return the largest value of a pixel: that of one that is over-exposed."""
-    return _FULL[pixel_format]
 
 
 @dataclass(frozen=True, slots=True)

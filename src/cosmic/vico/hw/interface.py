@@ -30,6 +30,20 @@ class PixelFormat(StrEnum):
     MONO16 = "Mono16"
     RGB8 = "RGB8"
 
+    @property
+    def full_scale(self) -> int:
+        """The largest value of a pixel: that of one that is over-exposed."""
+        return _FULL_SCALE[self]
+
+
+_FULL_SCALE: Final = {
+    PixelFormat.MONO8: 255,
+    PixelFormat.MONO10: 1023,
+    PixelFormat.MONO12: 4095,
+    PixelFormat.MONO16: 65535,
+    PixelFormat.RGB8: 255,
+}
+
 
 class Trigger(StrEnum):
     """What starts an exposure."""

@@ -83,6 +83,13 @@ def clock() -> ManualClock:
 
 
 @pytest.fixture
+def wall(monkeypatch: pytest.MonkeyPatch) -> ManualClock:
+    wall = ManualClock(auto_advance=True)
+    monkeypatch.setattr(sight, "WALL", wall)
+    return wall
+
+
+@pytest.fixture
 def camera(clock: ManualClock) -> FakeCamera:
     return FakeCamera(clock)
 
@@ -151,14 +158,18 @@ def test_a_camera_that_was_unplugged_is_given_up_soon_and_at_once_the_next_time(
     assert not last.given_up
 
 
-def test_one_that_is_known_to_be_lost_for_long_is_given_up_as_soon_as_an_image_is_wanted(
-    camera: FakeCamera, clock: ManualClock, monkeypatch: pytest.MonkeyPatch
-):
-    wall = ManualClock(auto_advance=True)
-    monkeypatch.setattr(sight, "WALL", wall)
+def lost_for_long(camera: FakeCamera, wall: ManualClock) -> LastSeen:
+    """Return what was seen of a camera that was unplugged long ago, by the clock of the wall."""
     last, camera.unplugged = LastSeen(), True
     assert not last.stays_lost(camera.problem)
     wall.advance(sight.GIVE_UP_WALL_S + 1.0)
+    return last
+
+
+def test_one_that_is_known_to_be_lost_for_long_is_given_up_as_soon_as_an_image_is_wanted(
+    camera: FakeCamera, clock: ManualClock, wall: ManualClock
+):
+    last = lost_for_long(camera, wall)
     began_s = wall.now_s()
     with pytest.raises(NotAvailable, match=r"no image of microscope: it was unplugged"):
         wanted(camera, clock, last).wait(20.0)
@@ -167,13 +178,9 @@ def test_one_that_is_known_to_be_lost_for_long_is_given_up_as_soon_as_an_image_i
 
 
 def test_one_that_came_back_meanwhile_counts_as_lost_anew(
-    camera: FakeCamera, clock: ManualClock, monkeypatch: pytest.MonkeyPatch
+    camera: FakeCamera, clock: ManualClock, wall: ManualClock
 ):
-    wall = ManualClock(auto_advance=True)
-    monkeypatch.setattr(sight, "WALL", wall)
-    last, camera.unplugged = LastSeen(), True
-    assert not last.stays_lost(camera.problem)
-    wall.advance(sight.GIVE_UP_WALL_S + 1.0)
+    last = lost_for_long(camera, wall)
     camera.unplugged = False
     wanted(camera, clock, last).wait(5.0)
     camera.unplugged = True

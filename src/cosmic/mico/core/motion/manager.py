@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import (
-    Callable,
     Collection,
     Generator,
     Iterable,
@@ -11,7 +10,6 @@ from collections.abc import (
     Set,
 )
 from contextlib import contextmanager
-from dataclasses import dataclass
 from threading import RLock
 from typing import Final
 
@@ -39,7 +37,6 @@ from cosmic.mico.core.collision.model import BodyPair
 from cosmic.mico.core.mode import Mode
 from cosmic.mico.core.motion.checks import Limits
 from cosmic.mico.core.motion.data_container import (
-    NO_DEVICE,
     DeviceDataContainer,
     DeviceListener,
     Memory,
@@ -48,6 +45,7 @@ from cosmic.mico.core.motion.device import Device
 from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander
 from cosmic.mico.core.motion.gate import Gate
 from cosmic.mico.core.motion.group import GroupOrders
+from cosmic.mico.core.motion.inventory import open_devices, take_inventory
 from cosmic.mico.core.motion.lease import Lease
 from cosmic.mico.core.motion.links import LinkTable
 from cosmic.mico.core.motion.messages import DeviceLost, Order
@@ -56,157 +54,9 @@ from cosmic.mico.core.motion.orders import Interval, Motion
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.core.motion.stop_latch import StopLatch
 from cosmic.mico.core.settings import MicoSettings, WatchSettings
-from cosmic.mico.hw.interface import Capabilities, Channel, Controller, DeviceIdentity, Serial
+from cosmic.mico.hw.interface import Channel, Controller
 
 logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True)
-class Inventory:
-    """The devices by index, where each axis is connected, and what is not there, a line each."""
-
-    devices: dict[int, Device]
-    addresses: dict[str, Channel]
-    missing: tuple[str, ...]
-
-
-class DeviceMaker:
-    """Makes the devices with all that they need.
-
-    Parameters
-    ----------
-    on_lost : callable
-        Method of a QObject, called in the thread of a device that cannot be reached any more.
-    on_stop_late : callable
-        Method of a QObject, called where the library does not return from a stop.
-    """
-
-    def __init__(
-        self,
-        controller: Controller,
-        *,
-        gate: Gate,
-        clock: Clock,
-        settings: MicoSettings,
-        policy: FailurePolicy,
-        on_lost: Callable[[DeviceLost], None],
-        on_stop_late: Callable[[], None],
-    ) -> None:
-        self._controller = controller
-        self._gate = gate
-        self._clock = clock
-        self._settings = settings
-        self._policy = policy
-        self._on_lost = on_lost
-        self._on_stop_late = on_stop_late
-
-    def inventory(
-        self,
-        library_index: Mapping[int, int],
-        memories: Mapping[str, Memory],
-        *,
-        searched: bool,
-    ) -> Inventory:
-        """Make containers and devices for what is present and for what is only configured.
-
-        Parameters
-        ----------
-        library_index : mapping of int
-            The library's index of each device that is present, by its number in the configuration.
-        memories : mapping of Memory
-            What the user has set on each axis, which outlives the search for devices.
-        searched : bool
-            The hardware was looked for, so that what is not present is missing.
-        """
-        positioners, hold_s = self._settings.positioner, self._settings.defaults.hold
-        devices: dict[int, Device] = {}
-        addresses: dict[str, Channel] = {}
-        missing: list[str] = []
-        for number in sorted({each.device for each in positioners} | set(library_index)):
-            here = {each.channel: each for each in positioners if each.device == number}
-            at = library_index.get(number, number)
-            can = self._capabilities(at if number in library_index else None)
-            container = DeviceDataContainer(number, here, hold_s, at, can)
-            container.remember(memories)
-            if number not in library_index:
-                for channel in here:
-                    container.settle(channel, None, NO_DEVICE)
-                if searched:
-                    names = ", ".join(each.name for each in here.values())
-                    missing.append(f"device {number} was not found ({names})")
-            devices[number] = self._make(container)
-            for positioner in here.values():
-                addresses[positioner.name] = positioner.address
-        return Inventory(devices, addresses, tuple(missing))
-
-    def _capabilities(self, at: int | None) -> Capabilities:
-        if at is None:
-            return self._controller.capabilities
-        return self._controller.device_capabilities(at)
-
-    def _make(self, container: DeviceDataContainer) -> Device:
-        device = Device(
-            self._controller,
-            container,
-            gate=self._gate,
-            clock=self._clock,
-            settings=self._settings,
-            policy=self._policy,
-        )
-        device.lost.connect(self._on_lost, Qt.ConnectionType.DirectConnection)
-        device.stop_late.connect(self._on_stop_late, Qt.ConnectionType.DirectConnection)
-        return device
-
-
-def open_devices(controller: Controller, wanted: Sequence[Serial]) -> dict[int, int]:
-    """Open the devices with the serial numbers `wanted`, or all where none are.
-
-    Returns
-    -------
-    dict of int
-        The library's index of each device by its number in the configuration.
-    """
-    identities = controller.open(_serials_to_open(controller, wanted))
-    return _library_indices(controller, wanted, identities)
-
-
-def _serials_to_open(controller: Controller, wanted: Sequence[Serial]) -> tuple[Serial, ...]:
-    """Return those of the configured serial numbers that are connected; none wanted opens all.
-
-    Raises
-    ------
-    NotConnectedError
-        None of them is there; a foreign device is never opened instead.
-    """
-    if not wanted:
-        return ()
-    found = controller.find_devices()
-    present = tuple(serial for serial in wanted if serial in found)
-    if not present:
-        raise NotConnectedError(
-            f"none of the configured devices is connected (serial numbers {_listed(wanted)}; "
-            f"found {_listed(found)}); check power and USB, or the serials in the platform file"
-        )
-    return present
-
-
-def _library_indices(
-    controller: Controller, wanted: Sequence[Serial], identities: Sequence[DeviceIdentity]
-) -> dict[int, int]:
-    """Return the library's index of each device by its number in the configuration.
-
-    The library numbers whatever is connected, so that one device missing would shift the others
-    onto foreign axes: only the serial numbers tell which is which.
-    """
-    if wanted:
-        return {wanted.index(each.serial): each.index for each in identities}
-    if len(identities) > 1 and not controller.simulated:
-        logger.warning("no serials are configured: devices are numbered as the library does")
-    return {each.index: each.index for each in identities}
-
-
-def _listed(serials: Collection[Serial]) -> str:
-    return ", ".join(map(str, serials)) or "none"
 
 
 class DeviceThreads:
@@ -411,15 +261,6 @@ class DeviceManager(QObject):
         self._closed = False
         self._threads = DeviceThreads(controller, settings.watch, policy)
         self.gate = self._make_gate(checker or NoCollisionModel())
-        self._maker = DeviceMaker(
-            controller,
-            gate=self.gate,
-            clock=clock,
-            settings=settings,
-            policy=policy,
-            on_lost=self._on_device_lost,
-            on_stop_late=self._on_stop_late,
-        )
         self._groups = self._make_groups()
         if self.exemptions is not None:
             self.exemptions.on_watched_again = self._on_watched_again
@@ -570,11 +411,6 @@ class DeviceManager(QObject):
             for name, memory in device.container.memories().items()
         }
 
-    def _exchange(self, found: Inventory) -> None:
-        # Exchanged whole, for other threads look things up meanwhile.
-        self._devices, self._addresses = found.devices, found.addresses
-        self._missing = found.missing
-
     def _note_missing(self, reason: str) -> None:
         self._missing = (*self._missing, reason)
 
@@ -618,8 +454,29 @@ class DeviceManager(QObject):
 
     def _arrange(self, library_index: Mapping[int, int]) -> None:
         """Take what is present, and what is only configured, in place of what was there."""
-        searched = self._mode is not Mode.CLOSED
-        self._exchange(self._maker.inventory(library_index, self._memories(), searched=searched))
+        found = take_inventory(
+            self.controller,
+            self.settings,
+            library_index,
+            self._memories(),
+            searched=self._mode is not Mode.CLOSED,
+        )
+        devices = {number: self._make_device(each) for number, each in found.containers.items()}
+        # Exchanged whole, for other threads look things up meanwhile.
+        self._devices, self._addresses, self._missing = devices, found.addresses, found.missing
+
+    def _make_device(self, container: DeviceDataContainer) -> Device:
+        device = Device(
+            self.controller,
+            container,
+            gate=self.gate,
+            clock=self.clock,
+            settings=self.settings,
+            policy=self._policy,
+        )
+        device.lost.connect(self._on_device_lost, Qt.ConnectionType.DirectConnection)
+        device.stop_late.connect(self._on_stop_late, Qt.ConnectionType.DirectConnection)
+        return device
 
     def _start(self, numbers: Collection[int]) -> None:
         devices = [self._devices[number] for number in numbers]

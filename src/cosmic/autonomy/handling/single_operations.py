@@ -11,22 +11,22 @@ from cosmic.autonomy.bending.fit import measure_fibre
 from cosmic.autonomy.bending.plan import DRY_EI_N_M2, PlannedSpan
 from cosmic.autonomy.bending.result import UN_UM2_PER_N_M2, SpanFit
 from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.handling.approach import STAND_BACK_UM, line_of
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.force_limit import arm_force_limit, put_back
 from cosmic.autonomy.handling.grasp import in_jaws, seen_at, shape_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
-from cosmic.autonomy.handling.jaws import move_jaws, note_closed, note_gap
+from cosmic.autonomy.handling.jaws import move_jaws, note_closed, note_gap, open_jaws
+from cosmic.autonomy.handling.one_span import OneSpan
 from cosmic.autonomy.handling.plate import along
 from cosmic.autonomy.handling.prepare import retract_probe, zoom_to
 from cosmic.autonomy.handling.push import (
-    OneSpan,
     fit_settings,
     ready_force,
     span_limits,
 )
 from cosmic.autonomy.handling.put_away import ADHESION
-from cosmic.autonomy.handling.reach import STAND_BACK_UM, line_of
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Yielded
 from cosmic.vico.core.image import CameraImage
 
@@ -309,7 +309,7 @@ class LayBack(FibreOperation):
         yield work.go({work.table: fibre.reach.angle_deg} | work.at(work.gripper, x, y))
         with work.mico.collision.contact("grasp"):
             yield work.go_up(work.grasp_um)
-        yield from move_jaws(work, work.settings.grasp.gap_um - (work.gap_um or 0.0))
+        yield from open_jaws(work)
         with work.mico.collision.contact("grasp"):
             yield work.go_up(positions.travel_um)
         yield work.go(work.at(work.gripper, x - STAND_BACK_UM * work.jaws.forward, y))

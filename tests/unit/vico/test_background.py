@@ -1,75 +1,11 @@
-"""Contrast is taken from a histogram, and uneven light is divided out of the image."""
-
-import math
+"""Uneven light is divided out of the image."""
 
 import numpy as np
 import pytest
 
 from cosmic.frame.errors import ConfigError
 from cosmic.vico.core.background import Background
-from cosmic.vico.core.levels import FULL_SCALE, measure_levels, over_exposed
-from cosmic.vico.hw.interface import Frame, FrameStatus, PixelFormat, Pixels
-
-MONO = [each for each in PixelFormat if each is not PixelFormat.RGB8]
-
-
-def normal(pixel_format: PixelFormat, seed: int = 0) -> Pixels:
-    full = FULL_SCALE[pixel_format]
-    kind = np.uint8 if full == 255 else np.uint16
-    values = np.random.default_rng(seed).normal(0.4, 0.08, (600, 800)) * full
-    return np.clip(values, 0, full).astype(kind)
-
-
-@pytest.mark.parametrize("pixel_format", MONO)
-def test_percentiles_are_those_of_all_pixels_at_every_depth(pixel_format: PixelFormat) -> None:
-    data = normal(pixel_format)
-    levels = measure_levels(data, pixel_format)
-    for percent in (0.5, 10.0, 50.0, 99.5):
-        expected = np.percentile(data, percent)
-        assert levels.percentile(percent) == pytest.approx(
-            expected, abs=0.004 * FULL_SCALE[pixel_format]
-        )
-    assert levels.counts.sum() == levels.pixels < data.size
-    assert levels.bin_width * len(levels.counts) == FULL_SCALE[pixel_format] + 1
-
-
-@pytest.mark.parametrize("pixel_format", MONO)
-def test_the_share_of_pixels_at_both_ends_is_reported(pixel_format: PixelFormat) -> None:
-    data = normal(pixel_format)
-    data[:60] = 0
-    data[:, :200] = FULL_SCALE[pixel_format]
-    levels = measure_levels(data, pixel_format)
-    assert levels.bright_share == pytest.approx(0.25, abs=0.01)
-    assert levels.dark_share == pytest.approx(0.075, abs=0.01)
-    assert over_exposed(data, pixel_format).sum() == 200 * 600
-
-
-def test_a_colour_that_is_over_exposed_is_marked() -> None:
-    data = np.full((40, 50, 3), 90, np.uint8)
-    data[3, 4, 1] = 255
-    assert np.argwhere(over_exposed(data, PixelFormat.RGB8)).tolist() == [[3, 4]]
-    assert measure_levels(data, PixelFormat.RGB8).percentile(50.0) == pytest.approx(90.0, abs=1.0)
-
-
-@pytest.mark.parametrize("value", [0, 117, 255])
-def test_an_image_of_one_grey_can_still_be_shown(value: int) -> None:
-    low, high = measure_levels(np.full((30, 30), value, np.uint8), PixelFormat.MONO8).stretch()
-    assert high >= low + 1.0 - 1e-9
-    assert low <= value + 1.0
-
-
-@pytest.mark.parametrize("percent", [-0.1, 100.1, math.nan])
-def test_what_is_no_percentile_is_refused(percent: float) -> None:
-    with pytest.raises(ConfigError, match="no percentile"):
-        measure_levels(normal(PixelFormat.MONO8), PixelFormat.MONO8).percentile(percent)
-
-
-def test_pixels_of_another_format_are_refused() -> None:
-    with pytest.raises(ConfigError, match="Mono12 has pixels of uint16, not uint8"):
-        measure_levels(normal(PixelFormat.MONO8), PixelFormat.MONO12)
-
-
-# --- background -------------------------------------------------------------------------------
+from cosmic.vico.hw.interface import Frame, FrameStatus, PixelFormat
 
 
 def light() -> np.ndarray:
@@ -85,7 +21,7 @@ def frame(
     status: FrameStatus = FrameStatus.COMPLETE,
     rows: int = 120,
 ) -> Frame:
-    full = FULL_SCALE[pixel_format]
+    full = pixel_format.full_scale
     values = light() * level * full / 255.0
     values += np.random.default_rng(seed).normal(0, 2.0 * full / 255.0, values.shape)
     kind = np.uint8 if full == 255 else np.uint16
@@ -119,7 +55,7 @@ def test_the_ground_is_even_afterwards_in_the_same_format(pixel_format: PixelFor
 @pytest.mark.parametrize("pixel_format", [PixelFormat.MONO10, PixelFormat.MONO12])
 def test_no_pixel_exceeds_what_its_format_can_hold(pixel_format: PixelFormat) -> None:
     bright = frame(300.0, pixel_format=pixel_format)
-    assert filled(pixel_format).correct(bright).max() == FULL_SCALE[pixel_format]
+    assert filled(pixel_format).correct(bright).max() == pixel_format.full_scale
 
 
 def test_without_a_background_the_image_passes_as_it_is() -> None:

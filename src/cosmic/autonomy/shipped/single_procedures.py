@@ -1,14 +1,14 @@
 """The operations of a bend test one by one, each as a procedure for a fibre that was pointed at."""
 
+from cosmic.autonomy.handling.approach import Turn
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.grasp import Carry
 from cosmic.autonomy.handling.marked import ChooseMarked, MarkedFibre
 from cosmic.autonomy.handling.prepare import make_safe
 from cosmic.autonomy.handling.push import NO_CONTACT, Retract, StepBack
 from cosmic.autonomy.handling.put_away import Finish, GiveUp, NoteFailure
-from cosmic.autonomy.handling.reach import Turn
 from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.handling.single import (
+from cosmic.autonomy.handling.single_operations import (
     AtProbe,
     CarryBack,
     CloseGently,
