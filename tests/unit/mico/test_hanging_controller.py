@@ -132,7 +132,7 @@ def test_a_stop_soon_after_the_library_began_to_hang_returns(hang):
         rig["d0.c0"].move_to(100.0, wait=False)
         wait_until(lambda: rig["d0.c0"].details.in_motion)
         hang.hanging = True
-        WALL.sleep(0.6)
+        WALL.sleep(0.9)
         stopping = threading.Thread(target=rig.application.manager.stop, args=("test",))
         stopping.start()
         stopping.join(PROMPT_S)
@@ -142,7 +142,9 @@ def test_a_stop_soon_after_the_library_began_to_hang_returns(hang):
         assert returned
 
 
-def test_a_stop_that_the_library_does_not_carry_out_is_reported_though_its_caller_hangs(hang, caplog):
+def test_a_stop_that_the_library_does_not_carry_out_is_reported_though_its_caller_hangs(
+    hang, caplog
+):
     with mico(TWO, instant=False) as (rig, controller):
         hang.into(controller, "stop")
         manager = rig.application.manager
