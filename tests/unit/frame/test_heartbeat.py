@@ -55,7 +55,7 @@ def test_a_thread_that_has_not_begun_or_has_ended_does_not_hang(
 
 
 def test_the_watch_looks_until_it_is_ended(beating: Heartbeat, told: list[float]) -> None:
-    beating.beat(0.4)
+    beating.beat(0.5)
     watch = HeartbeatWatch("drivers", [beating], FailurePolicy())
     watch.start()
     try:

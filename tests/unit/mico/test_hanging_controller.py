@@ -132,7 +132,7 @@ def test_a_stop_soon_after_the_library_began_to_hang_returns(hang):
         rig["d0.c0"].move_to(100.0, wait=False)
         wait_until(lambda: rig["d0.c0"].details.in_motion)
         hang.hanging = True
-        WALL.sleep(0.6)
+        WALL.sleep(0.9)
         stopping = threading.Thread(target=rig.application.manager.stop, args=("test",))
         stopping.start()
         stopping.join(PROMPT_S)

@@ -11,8 +11,8 @@ from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.threads import JOIN_TIMEOUT_S, WorkerThread
 
 _KNOWN_TO_HANG_S: Final = 0.5
-SUSPECT_S: Final = 0.25
-"""After so long in a call a device may hang: others stop it in a thread of its own."""
+SUSPECT_S: Final = 0.5
+"""After so long in a call, and one look, a device may hang: others stop it in another thread."""
 LATE_S: Final = 1.0
 """A stop from which the library has not returned by then is told not to be carried out."""
 
