@@ -59,7 +59,7 @@ class ChooseStandard(FibreOperation):
         yield SAFE_POINT
 
 
-class CarryBack(FibreOperation):
+class CarryStandardBack(FibreOperation):
     """The standard is carried to where it was taken up, and held just above the plate."""
 
     name = "carry the standard back"

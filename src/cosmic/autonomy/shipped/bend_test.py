@@ -38,7 +38,7 @@ from cosmic.autonomy.handling.put_away import (
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.standard import (
     NO_STANDARD,
-    CarryBack,
+    CarryStandardBack,
     ChooseStandard,
     LeaveStandard,
     LookForStandard,
@@ -156,7 +156,7 @@ def one_standard(
     back = Sequence[HandlingContext](
         "put back",
         *leaving,
-        CarryBack(),
+        CarryStandardBack(),
         Retry(Release(), RELEASES, only={ADHESION}, between=WipeAtHome()),
     )
     return Sequence(
