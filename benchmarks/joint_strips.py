@@ -13,6 +13,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from unittest.mock import patch
 
 import cv2
 import numpy as np
@@ -83,7 +84,9 @@ def found_on(
     image: np.ndarray, lines: list[np.ndarray], points: np.ndarray
 ) -> list[tuple[Scene, Course, np.ndarray]]:
     """Return what is found on an image, as far as it is known where fibres end on it."""
-    with benchmark.recorded() as traced:
+    # What the network there is says of it decides nothing here, and there may be none.
+    unasked = patch.object(learned_joint, "clearest", return_value=None)
+    with benchmark.recorded() as traced, unasked:
         cases = benchmark.cases(find_fibres(image), lines)
     found = []
     for case in cases:
