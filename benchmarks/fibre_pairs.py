@@ -126,6 +126,11 @@ def wandering(rng: np.random.Generator, count: int, spread: float, wave: float) 
 def piece(rng: np.random.Generator, length: float, width: float, rough: float) -> Piece:
     """Return a fibre from (0, 0) along x."""
     line = curved(rng, length, float(rng.uniform(0.0, 1.2)), width)
+    return unevenness(rng, line, width, rough)
+
+
+def unevenness(rng: np.random.Generator, line: np.ndarray, width: float, rough: float) -> Piece:
+    """Return a fibre along a line, with a width and a darkness that wander."""
     wave = max(2.0, float(rng.uniform(1.0, 6.0)) * width / STEP_PX)
     return Piece(
         line,

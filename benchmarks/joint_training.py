@@ -19,11 +19,11 @@ from benchmarks import fibre_pairs
 from benchmarks.joint_strips import Known, loaded
 from cosmic.vico.core.vision import learned_joint
 
-CHANNELS, FACTS, WHOLE, TAPS = 48, 4, 32, 5
+CHANNELS, FACTS, WHOLE, TAPS = 64, 5, 48, 5
 COLUMNS = 8192
 """Columns of strips that are learnt from at once."""
 LENGTHS = (128, 192, 256, 384, 512, 640)
-STEPS, RATE, DECAY = 4500, 3e-3, 1e-4
+STEPS, RATE, DECAY = 10_000, 3e-3, 1e-4
 HELD_BACK = 11
 """One seed of so many is not learnt from, but only looked at."""
 PLACE_SHARE, MORE = 0.3, 4.0

@@ -58,8 +58,9 @@ class Strip:
         radians, towards the last row; last, whether nothing else covers it.
     where : ndarray of bool, shape (n / STRIDE,)
         Where a joint would be seen: away from ends, and from what crosses.
-    facts : ndarray, shape (4,), float32
-        Noise in multiples of the contrast, blur in widths, JPEG, and its blocks in widths.
+    facts : ndarray, shape (5,), float32
+        Noise in multiples of the contrast, blur in widths, JPEG, its blocks in widths, and the
+        least width that is looked at in widths.
     """
 
     levels: Floats32
@@ -111,7 +112,8 @@ def strip_of(scene: Scene, course: Course) -> Strip | None:
     # Of a cell of the strip, which is the mean of many pixels where a fibre is thick.
     noise = course.noise / typical * min(1.0, np.sqrt(PER_WIDTH * ROWS / (2.0 * REACH)) / width)
     coded = scene.blockiness
-    facts = [noise, course.blur_px / width, coded, coded * LEAST_WIDTH_PX / width]
+    least = LEAST_WIDTH_PX / width
+    facts = [noise, course.blur_px / width, coded, coded * least, least]
     return Strip(levels, where, np.minimum(facts, 1.0).astype(np.float32))
 
 
