@@ -113,6 +113,11 @@ class ForceSide:
         """Return the whole truth now: force, what touches where, each fibre's state."""
         return self.timeline.moment(now_s)
 
+    @property
+    def unseen(self) -> int:
+        """How many movements of one stage nobody has looked at yet, at most."""
+        return self.timeline.unseen
+
     def _signal_un(self, times_s: Floats) -> Floats:
         return self.timeline.signal_un(times_s)
 
