@@ -43,6 +43,7 @@ class DriverCalls:
         self.listener = Heartbeat(partial(self._on_stall, 1))
         self.stops = Heartbeat(on_late_stop)
         self._stopping: set[object] = set()
+        self._watching = False
         self._stalled: set[int] = set()
         self._report = on_stall
         self._stops = JobQueue(f"stop of {name}", policy)
@@ -68,13 +69,22 @@ class DriverCalls:
     def _watched(self, call: Callable[[], None]) -> None:
         mine = object()
         self._stopping.add(mine)
-        self.stops.beat(LATE_S)
+        # A further stop does not begin the wait for one that hangs anew.
+        if not self._watching:
+            self._watch()
         try:
             call()
         finally:
             self._stopping.discard(mine)
-            if not self._stopping:
-                self.stops.beat(math.inf)
+            self._watch()
+
+    def _watch(self) -> None:
+        """Watch as long as somebody stops; without a lock, for no stop waits for another."""
+        while True:
+            self._watching = stopping = bool(self._stopping)
+            self.stops.beat(LATE_S if stopping else math.inf)
+            if bool(self._stopping) is stopping:
+                return
 
     def _on_stall(self, which: int, stalled_s: float) -> None:
         before = bool(self._stalled)
