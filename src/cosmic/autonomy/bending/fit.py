@@ -316,8 +316,8 @@ def assess_campaign(
     standards : sequence of MeasuredFibre
         Measured with their certificates; without any the sensor's certificate is in the intervals.
     refits : Refits, optional
-        Of the same campaign, assessed again and again while fibres come in: takes a third of the
-        time.
+        Of the same campaign, assessed again and again while fibres come in: then not all are
+        fitted again each time.
     """
     settings = settings or FitSettings()
     alone = tuple(_by_itself(each, settings) for each in standards)
