@@ -27,7 +27,7 @@ LIMIT_PART: Final = 0.4
 """Of the force limit: what one step of the search may add at most."""
 GUESS_TIMES: Final = 1.6
 """So much stiffer than guessed a fibre may be at a span."""
-SURE_TIMES: Final = 3.0
+SURE_TIMES: Final = 2.0
 """The probe comes near a fibre at once but for so many standard deviations of where that is."""
 SLOW_UM: Final = 100.0
 """How far before where it goes to the probe becomes slow: it may come from far away."""
@@ -38,6 +38,8 @@ LOST_PART: Final = 0.1
 CLEAR_UM: Final = 3.0
 """So far back a fibre does not cling to the probe."""
 FINE_UM: Final = 1.5
+PRESS_PART: Final = 0.75
+"""Of how far it is to be pressed: what one step adds at most."""
 PRESSES: Final = 8
 TINY_UN: Final = 0.01
 SLIDE_TIMES: Final = 2.0
@@ -333,9 +335,9 @@ class OneSpan:
         self, base_un: float, free_um: float
     ) -> Generator[Yielded, object, ForceMean | None]:
         """Push until the force tells much; None: so far that no slide would make it let go."""
-        push, step, before = self._push, min(self._step_um(), FINE_UM), 0.0
-        probe_um = free_um
+        push, probe_um, before = self._push, free_um, 0.0
         wanted_um = min(push.slide_um / SLIDE_WELL_TIMES, SLIDE_PART * self._plan.stroke_um)
+        step = min(self._step_um(), FINE_UM, PRESS_PART * wanted_um)
         for _ in range(PRESSES):
             probe_um, mean = yield from self._to(probe_um + step, push.average_s, loading=True)
             force = mean.mean_un - base_un

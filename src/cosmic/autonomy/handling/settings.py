@@ -240,7 +240,7 @@ class PushSettings(StrictModel):
     channel: str = "force"
     stand_off_um: float = Field(40.0, gt=0.0)
     bow_part: float = Field(0.3, ge=0.0)
-    near_um: float = Field(3.0, gt=0.0)
+    near_um: float = Field(2.0, gt=0.0)
     slow_hz: float = Field(500.0, ge=1.0, le=18500.0)
     surprise_un: float = Field(6.0, gt=0.0)
     search_um: float = Field(120.0, gt=0.0)
