@@ -221,6 +221,19 @@ def test_a_drag_shows_where_the_tool_would_stand(qtbot, shown, mouse, camera) ->
     assert colours_around(shown, place) == before
 
 
+def test_a_gripper_is_outlined_where_its_jaws_would_stand(qtbot, shown, mouse, camera) -> None:
+    tip, jaw = (300.0, 200.0), (280.0, 240.0)  # the inner edge of one jaw of a gap of 80 pixels
+    before = colours_around(shown, jaw)
+    shown.ghost.aim(tip, width_px=20.0)
+    shown.view.redraw()
+    assert GREEN.name().upper() not in colours_around(shown, jaw) - before
+    shown.ghost.aim(tip, width_px=20.0, gap_px=80.0)
+    shown.view.redraw()
+    assert GREEN.name().upper() in colours_around(shown, jaw) - before
+    between = colours_around(shown, (280.0, 210.0))
+    assert GREEN.name().upper() not in between, "nothing of it stands between its jaws"
+
+
 def test_the_wheel_with_ctrl_changes_the_height_and_not_the_zoom(qtbot, shown, camera) -> None:
     camera.change(calibration_problem="")
     qtbot.waitUntil(shown.row.go.isEnabled)
