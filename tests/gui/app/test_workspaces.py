@@ -37,6 +37,7 @@ from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.stop_button import StopButton
+from cosmic.frame.gui.tab_bars import is_in_front
 from cosmic.mico.core.sequence.report import StepState
 from cosmic.mico.gui.initialisation_panel import InitialisationPanel
 from cosmic.vico.api.vico import vico_of
@@ -323,6 +324,21 @@ def test_a_panel_from_the_view_menu_comes_in_front(own: OperatorWindow, qtbot: Q
     lens.toggleViewAction().trigger()
     qtbot.wait(300)  # in the first moment it is where it was, whoever is in front
     assert not lens.visibleRegion().isEmpty()
+
+
+def test_a_workspace_comes_back_with_the_panel_that_was_in_front(
+    own: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(own, qtbot, SET_UP)
+    own.raise_panel("First day")
+    day, axes = own.dock("First day"), own.dock("Axes")
+    qtbot.waitUntil(lambda: is_in_front(own, day))
+    choose(own, qtbot, HANDLE)
+    choose(own, qtbot, SET_UP)
+    assert is_in_front(own, day)
+    assert not is_in_front(own, axes)
+    own.reset_layout()
+    qtbot.waitUntil(lambda: is_in_front(own, axes))
 
 
 def test_a_narrow_bar_on_the_image_leaves_out_before_it_cuts(
