@@ -218,6 +218,9 @@ def test_the_log_keeps_what_a_card_told(
     lines = [each.getMessage() for each in caplog.records]
     line = next(each for each in lines if each.startswith("Close gently: "))
     assert told in line
+    undo = tasks(window).tool.undo
+    qtbot.waitUntil(lambda: not undo.isEnabled())
+    assert "on its card" in undo.toolTip(), "much has moved, and is not undone here"
 
 
 def test_jaws_opened_in_the_panel_leave_the_fibre_in_doubt(make: Make, qtbot: QtBot) -> None:

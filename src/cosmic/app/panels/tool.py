@@ -44,6 +44,9 @@ USUAL_STEP_UM: Final = 10.0
 USUAL_STEP_DEG: Final = 1.0
 SAFE_SIDE: Final = 0.1
 """How far before the place that a refusal names an axis is sent, in its unit."""
+NOTHING_TO_UNDO: Final = (
+    "Not available: no movement of yours to take back; what an operation did is undone on its card"
+)
 _DIRECTIONS: Final = ("x", "y", "z")
 _PLACES: Final = {"left": (1, 0), "right": (1, 2), "up": (0, 1), "down": (2, 1)}
 _Z_PLACES: Final = {1: (0, 3), -1: (2, 3)}
@@ -592,7 +595,7 @@ class ToolPanel(QWidget):
 
     def _on_undo_available(self, what: str) -> None:
         self.undo.setEnabled(bool(what))
-        self.undo.setToolTip(f"Ctrl+Z: {what}" if what else "Not available: nothing has moved")
+        self.undo.setToolTip(f"Ctrl+Z: {what}" if what else NOTHING_TO_UNDO)
 
     def _on_refreshed(self) -> None:
         tools = {each.name: each for each in tools_of(list(self._mico.names))}
