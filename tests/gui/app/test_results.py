@@ -141,6 +141,24 @@ def test_a_slope_is_read_over_time_and_over_position(
     assert "µN/µm" in viewer.slope.text()
 
 
+def test_over_an_axis_that_stood_still_no_slope_is_told(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    file = write_force(tmp_path / "monday" / "push.h5", close=False)
+    for after_s in np.arange(0.0, 4.0, 0.05):  # it arrives early, and stands from then on
+        here = 388.6 if after_s > 1.0 else 300.0
+        file.add_positions([AxisPosition(START_S + float(after_s), "probe.x", here)])
+    file.close(complete=True)
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    viewer = panel.viewer
+    viewer.curves.cursors.setRegion((2.0, 3.0))
+    viewer.across.setCurrentText("probe.x")
+    viewer.across.activated.emit(viewer.across.currentIndex())
+    assert "no slope, it stood still" in viewer.slope.text()
+    assert f"difference {SLOPE:.2f}"[:14] in viewer.slope.text()
+
+
 def test_the_cursors_bound_what_is_fitted(
     panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:
