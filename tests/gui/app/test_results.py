@@ -477,6 +477,22 @@ def test_what_is_seen_is_exported(panel: ResultsPanel, qtbot: QtBot, tmp_path: P
     assert panel.sessions.row_of("push_seen_values") is None  # a table is no film
 
 
+def test_what_was_exported_is_no_recording_and_leaves_the_day_of_its_session(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "before" / "push.h5")
+    when = time.time() - 9 * 86_400
+    os.utime(tmp_path / "before" / "push.h5", (when, when))
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    for _ in range(2):
+        qtbot.mouseClick(panel.viewer.export, LEFT)
+    assert (tmp_path / "before" / "push_seen_2.png").exists()
+    (session,) = sessions_in([tmp_path])
+    assert [each.name for each in session.items] == ["push"]
+    assert session.changed.timestamp() == pytest.approx(when, abs=1.0)
+
+
 def test_yesterdays_record_is_found_and_its_slope_read_in_six_actions(
     panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:
