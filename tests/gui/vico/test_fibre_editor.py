@@ -3,8 +3,9 @@
 from collections.abc import Callable
 
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtWidgets import QMessageBox
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QMouseEvent
+from PySide6.QtWidgets import QApplication, QMessageBox
 from pytestqt.qtbot import QtBot
 
 from cosmic.frame.errors import RecordingError
@@ -65,6 +66,41 @@ def test_clicks_add_a_fibre_that_a_second_click_on_its_end_finishes(qtbot: QtBot
     choose(qtbot, editor, "add")
     for x in (100.0, 200.0, 300.0, 300.0):
         click(qtbot, editor, x, 220.0)
+    assert lengths(editor) == pytest.approx([200, 300], abs=4)
+
+
+def test_a_double_click_ends_a_fibre_that_is_added(qtbot: QtBot) -> None:
+    editor = make(qtbot)
+    choose(qtbot, editor, "add")
+    click(qtbot, editor, 100.0, 220.0)
+    click(qtbot, editor, 300.0, 220.0)
+    pane, there = editor.view.viewport(), QPointF(at(editor, 300.0, 220.0))
+    again = QMouseEvent(  # the second press alone, which a desktop sends instead of another click
+        QEvent.Type.MouseButtonDblClick,
+        there,
+        pane.mapToGlobal(there),
+        LEFT,
+        LEFT,
+        Qt.KeyboardModifier.NoModifier,
+    )
+    QApplication.sendEvent(pane, again)
+    assert lengths(editor) == pytest.approx([200, 300], abs=4)
+
+
+@pytest.mark.parametrize("way", ["another edit", "save", "close"])
+def test_a_fibre_that_was_clicked_and_not_ended_is_not_lost(qtbot: QtBot, way: str) -> None:
+    editor = make(qtbot)
+    choose(qtbot, editor, "add")
+    click(qtbot, editor, 100.0, 220.0)
+    click(qtbot, editor, 300.0, 220.0)
+    if way == "another edit":
+        choose(qtbot, editor, "cut")
+    elif way == "save":
+        qtbot.mouseClick(editor.save, LEFT)
+    else:
+        editor.close()
+        assert editor.question is not None, "it is asked before it is lost"
+        qtbot.mouseClick(editor.question.button(QMessageBox.StandardButton.Save), LEFT)
     assert lengths(editor) == pytest.approx([200, 300], abs=4)
 
 

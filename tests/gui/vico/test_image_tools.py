@@ -195,6 +195,21 @@ def test_a_drag_aims_and_the_tool_moves_to_where_the_button_is_let_go(
     assert (place, what) == (pytest.approx((300.0, 200.0), abs=1.0), "right gripper")
 
 
+@pytest.mark.parametrize("kind", ["move", "region", "distance", "angle"])
+def test_a_double_click_is_one_click_for_a_tool(qtbot, shown, mouse, camera, kind) -> None:
+    camera.change(calibration_problem="")
+    qtbot.waitUntil(shown.row.go.isEnabled)
+    if kind == "move":
+        choose_target(qtbot, shown, "right gripper")
+    else:
+        click(qtbot, shown.row.tools[kind])
+    there = shown.view.to_screen.map(QPointF(300.0, 200.0)).toPoint()
+    pane = shown.view.viewport()
+    qtbot.mouseClick(pane, Qt.MouseButton.LeftButton, pos=there)
+    qtbot.mouseDClick(pane, Qt.MouseButton.LeftButton, pos=there)
+    assert len(camera.calls) == (1 if kind == "move" else 0)
+
+
 def colours_around(view, point_px) -> set[str]:
     """Return the colours on the screen within a few pixels of a pixel of the image."""
     there = view.view.to_screen.map(QPointF(*point_px)).toPoint()
