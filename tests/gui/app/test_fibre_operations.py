@@ -202,7 +202,7 @@ def test_a_gripper_closes_gently_and_says_how_far_it_is_open(make: Make, qtbot: 
     assert window.platform.mico.collision.allowed_contacts == frozenset()
 
 
-def test_the_log_keeps_what_a_card_told(
+def test_the_log_keeps_the_values_that_a_card_shows(
     make: Make, qtbot: QtBot, caplog: pytest.LogCaptureFixture
 ) -> None:
     window = with_fibres(make, qtbot)
@@ -214,10 +214,10 @@ def test_the_log_keeps_what_a_card_told(
     caplog.set_level(logging.INFO)
     Hand(window, qtbot).click(gently)
     card = done(window, qtbot, "Close gently")
-    told = card.findChildren(QLabel, "operationValue")[0].text()
+    value = card.findChildren(QLabel, "operationValue")[0].text()
     lines = [each.getMessage() for each in caplog.records]
     line = next(each for each in lines if each.startswith("Close gently: "))
-    assert told in line
+    assert value in line
     undo = tasks(window).tool.undo
     qtbot.waitUntil(lambda: not undo.isEnabled())
     assert "on its card" in undo.toolTip(), "much has moved, and is not undone here"

@@ -141,7 +141,7 @@ def test_a_slope_is_read_over_time_and_over_position(
     assert "µN/µm" in viewer.slope.text()
 
 
-def test_over_an_axis_that_stood_still_no_slope_is_told(
+def test_over_an_axis_that_stood_still_there_is_no_slope(
     panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:
     file = write_force(tmp_path / "monday" / "push.h5", close=False)

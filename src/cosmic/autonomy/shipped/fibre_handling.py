@@ -559,8 +559,8 @@ class FibreHandling:
         self._state.result = result
         _forget_moves(self._rig)
         values = ", ".join(f"{name} {value}" for name, value in result.values)
-        told = f"{result.text} {values}".strip()  # the card goes with the next operation
-        logger.info("%s: %s", result.title, told)
+        reported = f"{result.text} {values}".strip()  # the card goes with the next operation
+        logger.info("%s: %s", result.title, reported)
         self._state.changed.emit()
 
     def _note_done(self, operation: SingleOperation) -> None:
