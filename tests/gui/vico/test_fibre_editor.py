@@ -1,13 +1,18 @@
 """Fibres on an image are corrected by the mouse."""
 
+import signal
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
+import cv2
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QTimer
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QApplication, QMessageBox
 from pytestqt.qtbot import QtBot
 
+from cosmic.app.cli import main
 from cosmic.frame.errors import RecordingError
 from cosmic.vico.api import find_fibres
 from cosmic.vico.core.measuring.corrections import Corrections
@@ -196,3 +201,11 @@ def test_an_editor_without_edits_closes_at_once(qtbot: QtBot) -> None:
     editor = make(qtbot)
     editor.close()
     assert not editor.isVisible()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_a_signal_ends_the_command_and_its_window(qtbot: QtBot, tmp_path: Path) -> None:
+    file = tmp_path / "plate.png"
+    assert cv2.imwrite(str(file), IMAGE)
+    QTimer.singleShot(500, lambda: signal.raise_signal(signal.SIGTERM))
+    assert main(["correct", str(file)]) == 143
