@@ -1,5 +1,6 @@
 """Operations on a fibre from the picture: found, right-clicked, taken, bent, put away."""
 
+import logging
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -199,6 +200,27 @@ def test_a_gripper_closes_gently_and_says_how_far_it_is_open(make: Make, qtbot: 
     qtbot.waitUntil(lambda: opening.text() == "0 ± 49 µm")
     assert window.platform.mico.collision is not None
     assert window.platform.mico.collision.allowed_contacts == frozenset()
+
+
+def test_the_log_keeps_the_values_that_a_card_shows(
+    make: Make, qtbot: QtBot, caplog: pytest.LogCaptureFixture
+) -> None:
+    window = with_fibres(make, qtbot)
+    gently = window.findChild(QPushButton, "gripperGently")
+    assert isinstance(gently, QPushButton)
+    assert window.platform.mico is not None
+    manager = window.platform.mico.manager
+    qtbot.waitUntil(lambda: manager.state("left.gripper").present)
+    caplog.set_level(logging.INFO)
+    Hand(window, qtbot).click(gently)
+    card = done(window, qtbot, "Close gently")
+    value = card.findChildren(QLabel, "operationValue")[0].text()
+    lines = [each.getMessage() for each in caplog.records]
+    line = next(each for each in lines if each.startswith("Close gently: "))
+    assert value in line
+    undo = tasks(window).tool.undo
+    qtbot.waitUntil(lambda: not undo.isEnabled())
+    assert "on its card" in undo.toolTip(), "much has moved, and is not undone here"
 
 
 def test_jaws_opened_in_the_panel_leave_the_fibre_in_doubt(make: Make, qtbot: QtBot) -> None:

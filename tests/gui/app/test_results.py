@@ -141,6 +141,24 @@ def test_a_slope_is_read_over_time_and_over_position(
     assert "µN/µm" in viewer.slope.text()
 
 
+def test_over_an_axis_that_stood_still_there_is_no_slope(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    file = write_force(tmp_path / "monday" / "push.h5", close=False)
+    for after_s in np.arange(0.0, 4.0, 0.05):  # it arrives early, and stands from then on
+        here = 388.6 if after_s > 1.0 else 300.0
+        file.add_positions([AxisPosition(START_S + float(after_s), "probe.x", here)])
+    file.close(complete=True)
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    viewer = panel.viewer
+    viewer.curves.cursors.setRegion((2.0, 3.0))
+    viewer.across.setCurrentText("probe.x")
+    viewer.across.activated.emit(viewer.across.currentIndex())
+    assert "no slope, it stood still" in viewer.slope.text()
+    assert f"difference {SLOPE:.2f}"[:14] in viewer.slope.text()
+
+
 def test_the_cursors_bound_what_is_fitted(
     panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:
@@ -457,6 +475,22 @@ def test_what_is_seen_is_exported(panel: ResultsPanel, qtbot: QtBot, tmp_path: P
     panel.refresh()
     qtbot.wait(100)
     assert panel.sessions.row_of("push_seen_values") is None  # a table is no film
+
+
+def test_what_was_exported_is_no_recording_and_leaves_the_day_of_its_session(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "before" / "push.h5")
+    when = time.time() - 9 * 86_400
+    os.utime(tmp_path / "before" / "push.h5", (when, when))
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    for _ in range(2):
+        qtbot.mouseClick(panel.viewer.export, LEFT)
+    assert (tmp_path / "before" / "push_seen_2.png").exists()
+    (session,) = sessions_in([tmp_path])
+    assert [each.name for each in session.items] == ["push"]
+    assert session.changed.timestamp() == pytest.approx(when, abs=1.0)
 
 
 def test_yesterdays_record_is_found_and_its_slope_read_in_six_actions(

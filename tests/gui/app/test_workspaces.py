@@ -25,6 +25,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from cosmic.app.panels.tool import ToolPanel
 from cosmic.app.windows.central_view import CentralView
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.app.windows.tasks import HANDLE, LOOK, MEASURE, SET_UP, TaskLayout
@@ -34,7 +35,9 @@ from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.limit_indicator import LimitIndicator
 from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.stop_button import StopButton
+from cosmic.frame.gui.tab_bars import is_in_front
 from cosmic.mico.core.sequence.report import StepState
 from cosmic.mico.gui.initialisation_panel import InitialisationPanel
 from cosmic.vico.api.vico import vico_of
@@ -321,6 +324,21 @@ def test_a_panel_from_the_view_menu_comes_in_front(own: OperatorWindow, qtbot: Q
     lens.toggleViewAction().trigger()
     qtbot.wait(300)  # in the first moment it is where it was, whoever is in front
     assert not lens.visibleRegion().isEmpty()
+
+
+def test_a_workspace_comes_back_with_the_panel_that_was_in_front(
+    own: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(own, qtbot, SET_UP)
+    own.raise_panel("First day")
+    day, axes = own.dock("First day"), own.dock("Axes")
+    qtbot.waitUntil(lambda: is_in_front(own, day))
+    choose(own, qtbot, HANDLE)
+    choose(own, qtbot, SET_UP)
+    assert is_in_front(own, day)
+    assert not is_in_front(own, axes)
+    own.reset_layout()
+    qtbot.waitUntil(lambda: is_in_front(own, axes))
 
 
 def test_a_narrow_bar_on_the_image_leaves_out_before_it_cuts(
@@ -857,6 +875,61 @@ def test_what_a_refusal_offered_is_gone_when_the_axis_was_moved(
     qtbot.waitUntil(lambda: not tool.nearest.isVisible())
     assert tool.line.text() == ""
     qtbot.waitUntil(lambda: not card.axis.details.in_motion)
+
+
+def targets_of(tool: ToolPanel, qtbot: QtBot) -> dict[str, QuantityField]:
+    """Return the fields of the chosen tool by the names of its axes."""
+
+    def fields() -> list[QuantityField]:
+        return tool.findChildren(QuantityField, "toolTarget")
+
+    qtbot.waitUntil(lambda: len(fields()) == 3, timeout=5000)
+    return dict(zip(tool.axes, fields(), strict=False))
+
+
+def test_go_to_brings_no_axis_back_that_was_moved_by_other_means(
+    whole: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(whole, qtbot, HANDLE)
+    tool = tasks(whole).tool
+    cards = mico(whole).cards
+    qtbot.waitUntil(lambda: cards["left.x"].axis.details.present)
+    qtbot.mouseClick(tool.choices["right"], LEFT)
+    qtbot.mouseClick(tool.choices["left"], LEFT)
+    targets = targets_of(tool, qtbot)
+    before = position(cards["left.x"]), position(cards["left.y"])
+    tool.step.setText("500")
+    qtbot.mouseClick(tool.pad["x", 1], LEFT)
+    qtbot.waitUntil(lambda: abs(position(cards["left.x"]) - before[0] - 500.0) < 2.0)
+    moved = position(cards["left.x"])
+    qtbot.waitUntil(lambda: abs(targets["left.x"].value() - moved) < 2.0)
+    wanted = float(round(before[1]) + 30)
+    targets["left.y"].selectAll()
+    qtbot.keyClicks(targets["left.y"], f"{wanted:.0f}")
+    qtbot.mouseClick(tool.go, LEFT)
+    qtbot.waitUntil(lambda: abs(position(cards["left.y"]) - wanted) < 2.0)
+    assert position(cards["left.x"]) == pytest.approx(moved, abs=2.0)
+    assert targets["left.y"].value() == pytest.approx(wanted), "what was typed stays"
+
+
+def test_a_target_typed_waits_while_another_axis_moves(whole: OperatorWindow, qtbot: QtBot) -> None:
+    choose(whole, qtbot, HANDLE)
+    tool = tasks(whole).tool
+    cards = mico(whole).cards
+    qtbot.waitUntil(lambda: cards["left.x"].axis.details.present)
+    qtbot.mouseClick(tool.choices["right"], LEFT)
+    qtbot.mouseClick(tool.choices["left"], LEFT)
+    targets = targets_of(tool, qtbot)
+    wanted = round(position(cards["left.y"])) + 40
+    targets["left.y"].selectAll()
+    qtbot.keyClicks(targets["left.y"], str(wanted))
+    x_before = position(cards["left.x"])
+    tool.step.setText("60")
+    qtbot.mouseClick(tool.pad["x", 1], LEFT)
+    qtbot.waitUntil(lambda: abs(position(cards["left.x"]) - x_before - 60.0) < 2.0)
+    assert targets["left.y"].text() == str(wanted)
+    qtbot.mouseClick(tool.go, LEFT)
+    qtbot.waitUntil(lambda: abs(position(cards["left.y"]) - wanted) < 2.0)
 
 
 def test_the_table_of_axes_shows_a_target_with_its_sign(

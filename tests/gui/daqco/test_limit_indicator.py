@@ -27,7 +27,7 @@ DISARMED = ARMED.model_copy(update={"armed": False})
             "▲ force limit ±150 µN: NOT WATCHED",
             "warning",
         ),
-        (Limited(ARMED, crossed=True), 10.0, "■ force limit ±150 µN: STOPPED", "alarm"),
+        (Limited(ARMED, crossed=True), 10.0, "■ force limit ±150 µN: CROSSED", "alarm"),
     ],
 )
 def test_a_limit_is_reported_with_its_state_and_the_distance_to_it(limit, value, text, tone):

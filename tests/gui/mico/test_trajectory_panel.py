@@ -122,6 +122,25 @@ def test_it_steps_pauses_runs_and_reports_how_far_it_is(
     wait_for(panel, qtbot, PlayState.ENDED)
 
 
+def test_a_line_that_was_stopped_is_marked_until_it_goes_on(
+    panel: TrajectoryPanel, mico: Mico, qtbot: QtBot, tmp_path: Path
+) -> None:
+    opened(panel, qtbot, tmp_path, HEAD + "left.y to 100 um\nwait 1 s\nleft.y to 0 um\n")
+    click(qtbot, panel, "step")
+    wait_for(panel, qtbot, PlayState.PAUSED)
+    mico.stop("a test")
+    try:
+        click(qtbot, panel, "runTrajectory")
+        wait_for(panel, qtbot, PlayState.FAILED)
+        assert list(panel.lines.lines.problems)
+    finally:
+        mico.reset_stop()
+    click(qtbot, panel, "runTrajectory")
+    wait_for(panel, qtbot, PlayState.ENDED)
+    assert not panel.lines.lines.problems
+    assert panel.report.text().startswith("done.")
+
+
 def test_what_a_rehearsal_says_does_not_push_the_buttons_below_it(
     panel: TrajectoryPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:

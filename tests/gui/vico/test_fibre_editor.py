@@ -1,12 +1,18 @@
 """Fibres on an image are corrected by the mouse."""
 
+import signal
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
+import cv2
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtWidgets import QMessageBox
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QTimer
+from PySide6.QtGui import QMouseEvent
+from PySide6.QtWidgets import QApplication, QMessageBox
 from pytestqt.qtbot import QtBot
 
+from cosmic.app.cli import main
 from cosmic.frame.errors import RecordingError
 from cosmic.vico.api import find_fibres
 from cosmic.vico.core.measuring.corrections import Corrections
@@ -65,6 +71,41 @@ def test_clicks_add_a_fibre_that_a_second_click_on_its_end_finishes(qtbot: QtBot
     choose(qtbot, editor, "add")
     for x in (100.0, 200.0, 300.0, 300.0):
         click(qtbot, editor, x, 220.0)
+    assert lengths(editor) == pytest.approx([200, 300], abs=4)
+
+
+def test_a_double_click_ends_a_fibre_that_is_added(qtbot: QtBot) -> None:
+    editor = make(qtbot)
+    choose(qtbot, editor, "add")
+    click(qtbot, editor, 100.0, 220.0)
+    click(qtbot, editor, 300.0, 220.0)
+    pane, there = editor.view.viewport(), QPointF(at(editor, 300.0, 220.0))
+    again = QMouseEvent(  # the second press alone, which a desktop sends instead of another click
+        QEvent.Type.MouseButtonDblClick,
+        there,
+        pane.mapToGlobal(there),
+        LEFT,
+        LEFT,
+        Qt.KeyboardModifier.NoModifier,
+    )
+    QApplication.sendEvent(pane, again)
+    assert lengths(editor) == pytest.approx([200, 300], abs=4)
+
+
+@pytest.mark.parametrize("way", ["another edit", "save", "close"])
+def test_a_fibre_that_was_clicked_and_not_ended_is_not_lost(qtbot: QtBot, way: str) -> None:
+    editor = make(qtbot)
+    choose(qtbot, editor, "add")
+    click(qtbot, editor, 100.0, 220.0)
+    click(qtbot, editor, 300.0, 220.0)
+    if way == "another edit":
+        choose(qtbot, editor, "cut")
+    elif way == "save":
+        qtbot.mouseClick(editor.save, LEFT)
+    else:
+        editor.close()
+        assert editor.question is not None, "it is asked before it is lost"
+        qtbot.mouseClick(editor.question.button(QMessageBox.StandardButton.Save), LEFT)
     assert lengths(editor) == pytest.approx([200, 300], abs=4)
 
 
@@ -160,3 +201,11 @@ def test_an_editor_without_edits_closes_at_once(qtbot: QtBot) -> None:
     editor = make(qtbot)
     editor.close()
     assert not editor.isVisible()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_a_signal_ends_the_command_and_its_window(qtbot: QtBot, tmp_path: Path) -> None:
+    file = tmp_path / "plate.png"
+    assert cv2.imwrite(str(file), IMAGE)
+    QTimer.singleShot(500, lambda: signal.raise_signal(signal.SIGTERM))
+    assert main(["correct", str(file)]) == 143

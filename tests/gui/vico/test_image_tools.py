@@ -195,6 +195,21 @@ def test_a_drag_aims_and_the_tool_moves_to_where_the_button_is_let_go(
     assert (place, what) == (pytest.approx((300.0, 200.0), abs=1.0), "right gripper")
 
 
+@pytest.mark.parametrize("kind", ["move", "region", "distance", "angle"])
+def test_a_double_click_is_one_click_for_a_tool(qtbot, shown, mouse, camera, kind) -> None:
+    camera.change(calibration_problem="")
+    qtbot.waitUntil(shown.row.go.isEnabled)
+    if kind == "move":
+        choose_target(qtbot, shown, "right gripper")
+    else:
+        click(qtbot, shown.row.tools[kind])
+    there = shown.view.to_screen.map(QPointF(300.0, 200.0)).toPoint()
+    pane = shown.view.viewport()
+    qtbot.mouseClick(pane, Qt.MouseButton.LeftButton, pos=there)
+    qtbot.mouseDClick(pane, Qt.MouseButton.LeftButton, pos=there)
+    assert len(camera.calls) == (1 if kind == "move" else 0)
+
+
 def colours_around(view, point_px) -> set[str]:
     """Return the colours on the screen within a few pixels of a pixel of the image."""
     there = view.view.to_screen.map(QPointF(*point_px)).toPoint()
@@ -219,6 +234,19 @@ def test_a_drag_shows_where_the_tool_would_stand(qtbot, shown, mouse, camera) ->
     shown.ghost.aim(None)
     shown.view.redraw()
     assert colours_around(shown, place) == before
+
+
+def test_a_gripper_is_outlined_where_its_jaws_would_stand(qtbot, shown, mouse, camera) -> None:
+    tip, jaw = (300.0, 200.0), (280.0, 240.0)  # the inner edge of one jaw of a gap of 80 pixels
+    before = colours_around(shown, jaw)
+    shown.ghost.aim(tip, width_px=20.0)
+    shown.view.redraw()
+    assert GREEN.name().upper() not in colours_around(shown, jaw) - before
+    shown.ghost.aim(tip, width_px=20.0, gap_px=80.0)
+    shown.view.redraw()
+    assert GREEN.name().upper() in colours_around(shown, jaw) - before
+    between = colours_around(shown, (280.0, 210.0))
+    assert GREEN.name().upper() not in between, "nothing of it stands between its jaws"
 
 
 def test_the_wheel_with_ctrl_changes_the_height_and_not_the_zoom(qtbot, shown, camera) -> None:

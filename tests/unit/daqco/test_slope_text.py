@@ -2,9 +2,11 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from cosmic.daqco.core.curves import Slope
+from cosmic.daqco.core.curves import Slope, fit_slope
+from cosmic.frame.errors import RecordingError
 
 
 @pytest.mark.parametrize(
@@ -19,3 +21,12 @@ from cosmic.daqco.core.curves import Slope
 )
 def test_a_slope_has_two_figures_of_its_error(value: float, error: float, text: str) -> None:
     assert Slope(value, error, "µN/s", 0.0, 0.0, 100).text == text
+
+
+@pytest.mark.parametrize("position", [388.6, 0.1, -4999.7])
+def test_over_an_axis_that_stood_still_there_is_no_slope(position: float) -> None:
+    forces = np.linspace(0.0, 50.0, 1338)
+    with pytest.raises(RecordingError, match="travel"):
+        fit_slope(np.full(forces.size, position), forces, "uN/um")
+    moved = fit_slope(position + np.linspace(0.0, 0.01, forces.size), forces, "uN/um")
+    assert moved.value == pytest.approx(5000.0)

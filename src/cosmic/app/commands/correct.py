@@ -4,13 +4,16 @@ import argparse
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from cosmic.frame.errors import NotAvailable, RecordingError, RecordingExistsError
+from cosmic.frame.interruption import held_back
 from cosmic.vico.api.measure import Corrections, measure_page, read_images, side_file
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication, QWidget
+
+_SIGNAL_POLL_MS: Final = 250
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -75,11 +78,24 @@ def _application() -> "QApplication":
 def _shown(app: "QApplication", editor: "QWidget", chosen: argparse.Namespace) -> int:
     from PySide6.QtCore import QTimer
 
+    wake = QTimer(interval=_SIGNAL_POLL_MS)  # Python sees a signal only when it runs
+    wake.timeout.connect(wake.interval)
+    wake.start()
+    asked: list[str] = []
+
+    def end(name: str) -> None:
+        """Close it, which asks where edits are not kept; the second signal does not ask."""
+        if asked or editor.close():
+            app.quit()
+        asked.append(name)
+
     editor.show()
+    if chosen.offscreen is not None:
+        QTimer.singleShot(round(1000 * chosen.offscreen), app.quit)
+    with held_back(end):
+        code = app.exec()
     if chosen.offscreen is None:
-        return app.exec()
-    QTimer.singleShot(round(1000 * chosen.offscreen), app.quit)
-    code = app.exec()
+        return code
     if chosen.screenshot is not None and not editor.grab().save(str(chosen.screenshot)):
         raise RecordingError(f"{chosen.screenshot}: the image cannot be saved")
     editor.close()

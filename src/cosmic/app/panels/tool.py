@@ -20,17 +20,18 @@ from PySide6.QtWidgets import (
 
 from cosmic.app.panels.gripper_row import GripperRow
 from cosmic.app.panels.pose_choice import PoseChoice
+from cosmic.app.panels.target_row import TargetRow
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.gui.build import named, push_button, styled, tight_row, tipped
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.relay import Relay
-from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
+from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.operation import Progress
 from cosmic.frame.overrides import override
-from cosmic.frame.units import DISPLAY, format_quantity, with_micro_signs
+from cosmic.frame.units import DISPLAY, with_micro_signs
 from cosmic.frame.verdict import MoveVerdict, Reason
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.core.motion.positioner import Confidence, PositionerState
+from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.gui.detour_request import Goal
 from cosmic.mico.gui.key_names import key_text
 from cosmic.mico.gui.mico_widget import MicoWidget
@@ -43,6 +44,9 @@ USUAL_STEP_UM: Final = 10.0
 USUAL_STEP_DEG: Final = 1.0
 SAFE_SIDE: Final = 0.1
 """How far before the place that a refusal names an axis is sent, in its unit."""
+NOTHING_TO_UNDO: Final = (
+    "Not available: no movement of yours to take back; what an operation did is undone on its card"
+)
 _DIRECTIONS: Final = ("x", "y", "z")
 _PLACES: Final = {"left": (1, 0), "right": (1, 2), "up": (0, 1), "down": (2, 1)}
 _Z_PLACES: Final = {1: (0, 3), -1: (2, 3)}
@@ -83,42 +87,6 @@ def tools_of(names: list[str]) -> list[Tool]:
     return [Tool(name, axes) for name, axes in found.items()]
 
 
-class _TargetRow:
-    """Where one axis stands, and where it is to go."""
-
-    def __init__(self, axis: Axis, caption: str, go: Callable[[], None]) -> None:
-        self.axis = axis
-        self._set = False
-        self.caption = QLabel(caption)
-        self.caption.setFixedWidth(STEP_PX + 2)
-        self.position = named(QLabel("–"), "toolPosition")
-        self.position.setFont(number_font(bold=True))
-        self.position.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        widest = self.position.fontMetrics().horizontalAdvance("-5000.0")
-        self.position.setMinimumWidth(widest)
-        self.target = named(
-            QuantityField(axis.unit, name=f"Target of {axis.key}; Enter moves there"), "toolTarget"
-        )
-        self.target.setMinimumWidth(9 * STEP_PX)
-        self.target.entered.connect(lambda _value: go())
-
-    def show_state(self, state: PositionerState) -> None:
-        """Show the newest state of the axis."""
-        here = state.shown_position
-        text = "–" if here is None else format_quantity(here, state.unit).split(" ")[0]
-        if text != self.position.text():
-            self.position.setText(text)
-        sure = state.confidence is Confidence.KNOWN
-        self.position.setEnabled(sure)
-        tip = "" if sure else "The position is not known; initialise first"
-        if self.position.toolTip() != tip:
-            self.position.setToolTip(tip)
-        if not self._set and state.shown_position is not None:
-            self._set = True
-            self.target.set_value(round(state.shown_position, 1))
-        self.target.setEnabled(state.present)
-
-
 class ToolPanel(QWidget):
     """Moves the chosen tool; every command is that of the axis' card, and so passes the gate.
 
@@ -145,7 +113,7 @@ class ToolPanel(QWidget):
         self._mico = gui.mico
         self._tools = {each.name: each for each in tools_of(list(self._mico.names))}
         self._tool = next(iter(self._tools), "")
-        self._rows: dict[str, _TargetRow] = {}
+        self._rows: dict[str, TargetRow] = {}
         self._grippers: dict[str, GripperRow] = {}
         self._closes_gently = False
         self._steps: dict[str, float] = {}
@@ -276,7 +244,7 @@ class ToolPanel(QWidget):
             if axis.kind is PositionerKind.OPEN_LOOP:
                 body.addWidget(self._make_gripper(axis))
                 continue
-            row = _TargetRow(axis, part[0].upper(), self._mover(name))
+            row = TargetRow(axis, part[0].upper(), self._mover(name))
             number = len(self._rows)
             for column, widget in enumerate((row.caption, row.position, row.target)):
                 grid.addWidget(widget, number, column)
@@ -627,7 +595,7 @@ class ToolPanel(QWidget):
 
     def _on_undo_available(self, what: str) -> None:
         self.undo.setEnabled(bool(what))
-        self.undo.setToolTip(f"Ctrl+Z: {what}" if what else "Not available: nothing has moved")
+        self.undo.setToolTip(f"Ctrl+Z: {what}" if what else NOTHING_TO_UNDO)
 
     def _on_refreshed(self) -> None:
         tools = {each.name: each for each in tools_of(list(self._mico.names))}

@@ -1,6 +1,7 @@
 """Sessions: the folders of what was recorded, what lies in them, and what is known of them."""
 
 import logging
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from datetime import date, datetime, timedelta
@@ -22,6 +23,9 @@ logger = logging.getLogger(__name__)
 ABOUT: Final = "session.toml"
 """Sample, operator and note of a session; a person may write it, too."""
 MOST_ITEMS: Final = 1000
+SEEN: Final = "_seen"
+"""Behind the name of a recording: an image of it as somebody saw it, which nobody recorded."""
+_EXPORTED: Final = re.compile(rf"{SEEN}(_\d+)?$")
 STILLS: Final = (".png", ".tif", ".tiff")
 
 
@@ -221,7 +225,8 @@ def _kind(path: Path, filmed: set[str]) -> ItemKind | None:
         return ItemKind.FORCE
     if path.is_dir() and (path / DATABASE).exists():
         return ItemKind.CAMPAIGN
-    if name.endswith(STILLS) and path.is_file() and path.stem not in filmed:
+    is_image = name.endswith(STILLS) and path.is_file()
+    if is_image and path.stem not in filmed and not _EXPORTED.search(path.stem):
         return ItemKind.IMAGE
     return None
 

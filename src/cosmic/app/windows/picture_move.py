@@ -127,6 +127,7 @@ class PictureMove(QObject):
                     from_px=known.tip_px,
                     forward=known.forward,
                     width_px=known.width_px,
+                    gap_px=known.gap_px,
                 )
             self._aim = lambda: self._ask_image(view, point_px, what)
             if not self._ask.isActive():

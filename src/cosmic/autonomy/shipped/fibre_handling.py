@@ -558,7 +558,9 @@ class FibreHandling:
             self._state.done = []
         self._state.result = result
         _forget_moves(self._rig)
-        logger.info("%s: %s", result.title, result.text)
+        values = ", ".join(f"{name} {value}" for name, value in result.values)
+        reported = f"{result.text} {values}".strip()  # the card goes with the next operation
+        logger.info("%s: %s", result.title, reported)
         self._state.changed.emit()
 
     def _note_done(self, operation: SingleOperation) -> None:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -9,7 +10,9 @@ import numpy.typing as npt
 from cosmic.frame.errors import RecordingError
 
 Values = npt.NDArray[np.float64]
-FEWEST_SAMPLES = 3
+ROUNDING: Final = 1e-9
+"""Part of a position that interpolation adds to one that does not change."""
+FEWEST_SAMPLES: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +63,7 @@ def fit_slope(positions: Values, values: Values, unit: str = "") -> Slope:
     middle = float(positions.mean())
     offsets = positions - middle
     spread = float(offsets @ offsets)
-    if not spread > 0.0:
+    if not float(np.ptp(positions)) > ROUNDING * max(1.0, abs(middle)):
         raise RecordingError(f"a slope needs travel; all {count} samples lie at {middle:g}")
     value = float(offsets @ values) / spread
     level = float(values.mean())

@@ -46,7 +46,7 @@ def reading(limit: DaqLimit, unit: str, value: float | None) -> LimitReading:
     given, shown = limit.settings, display_unit(unit)
     name = f"{given.channel} limit {sides_text(given.low, given.high)} {shown}"
     if limit.crossed:
-        return LimitReading(f"■ {name}: STOPPED", "alarm", limit_text(limit, unit))
+        return LimitReading(f"■ {name}: CROSSED", "alarm", limit_text(limit, unit))
     if not given.armed:
         why = limit.reason or "Arm it in Acquisition > Limits…"
         word = "NOT WATCHED" if limit.reason else "DISARMED"
@@ -68,7 +68,7 @@ def short_text(limit: DaqLimit, value: float | None) -> str:
     if not (limit.crossed or given.armed):  # no bound, then: the bar is as wide as with one
         return f"{given.channel} {now} DISARMED"
     bound = "–" if side is None else f"{side:g}"
-    return f"{given.channel} {now}/{bound} {'STOPPED' if limit.crossed else 'ARMED'}"
+    return f"{given.channel} {now}/{bound} {'CROSSED' if limit.crossed else 'ARMED'}"
 
 
 class LimitIndicator(Chip):

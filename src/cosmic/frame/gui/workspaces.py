@@ -124,6 +124,7 @@ class Workspaces(QObject):
         self._known: dict[str, Workspace] = {}
         self._docks: dict[str, QDockWidget] = {}
         self._states: dict[str, _Kept] = {}
+        self._fronts: dict[str, tuple[str, ...]] = {}
         self._altered = False
         self._laying = False
         self._current = ""
@@ -209,6 +210,7 @@ class Workspaces(QObject):
         What was kept under a name stays, and can be used again.
         """
         self._states.clear()
+        self._fronts.clear()
         self._layout = USUAL
         self._settings.setValue(_LAYOUT, USUAL)
         self._settings.remove(f"{_GROUP}/layouts/{USUAL}")
@@ -256,6 +258,7 @@ class Workspaces(QObject):
 
     def _load(self) -> None:
         self._states.clear()
+        self._fronts.clear()
         for name in self._known:
             key = f"{_GROUP}/layouts/{self._layout}/{name}"
             state, panels = self._settings.value(key), self._settings.value(key + _PANELS)
@@ -265,7 +268,11 @@ class Workspaces(QObject):
     # Laying out
 
     def _keep(self) -> None:
-        """Keep the panels as they are, where the operator put them elsewhere."""
+        """Keep which panels are in front, and all as they are where the operator moved some."""
+        if self._current:
+            self._fronts[self._current] = tuple(
+                name for name, dock in self._docks.items() if is_in_front(self._window, dock)
+            )
         if self._current and (self._altered or self._missing()):
             panels = tuple(name for name, dock in self._docks.items() if self._is_placed(dock))
             self._states[self._current] = _Kept(self._window.saveState(self._version), panels)
@@ -343,7 +350,8 @@ class Workspaces(QObject):
             if not placement.tabbed:
                 fronts.append(dock)
             dock.show()
-        for dock in fronts:
+        kept = (docks[title] for title in self._fronts.get(workspace.name, ()))
+        for dock in (*fronts, *(dock for dock in kept if self._is_placed(dock))):
             dock.raise_()
         self._size(workspace)
 

@@ -267,6 +267,8 @@ class TrajectoryPanel(QWidget):
         self.lines.show_line(0 if progress.state is PlayState.ENDED else progress.line)
         if progress.error:
             self.lines.lines.set_problems([Problem(progress.line, progress.error)])
+        elif progress.state in (PlayState.RUNNING, PlayState.ENDED) and self.lines.lines.problems:
+            self.lines.lines.set_problems([])  # it went on
         words = progress.error or progress.text
         player = self.player
         if progress.state is PlayState.ENDED and player and player.rehearsal is not None:

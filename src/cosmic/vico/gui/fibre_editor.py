@@ -5,8 +5,16 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from PySide6.QtCore import QPointF, Qt
-from PySide6.QtGui import QCloseEvent, QKeySequence, QPainter, QPainterPath, QPolygonF, QShortcut
+from PySide6.QtCore import QPointF, Qt, QTimer
+from PySide6.QtGui import (
+    QCloseEvent,
+    QKeySequence,
+    QPainter,
+    QPainterPath,
+    QPolygonF,
+    QShortcut,
+    QShowEvent,
+)
 from PySide6.QtWidgets import (
     QButtonGroup,
     QHBoxLayout,
@@ -20,6 +28,7 @@ from PySide6.QtWidgets import (
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.beside import open_beside
 from cosmic.frame.gui.build import named, tipped
+from cosmic.frame.gui.screen_fit import fit_to_screen
 from cosmic.frame.overrides import override
 from cosmic.vico.api.coordinate_transform import Pixel
 from cosmic.vico.core.image import CameraImage, Circumstances
@@ -97,6 +106,11 @@ class EditTool(Tool):
             self._layer.chosen, self._from = line.number, point_px
 
     @override
+    def press_again(self, point_px: Pixel) -> None:
+        if self.edit == "add":  # a second fibre must not be cut or deleted in haste
+            self._add(point_px)
+
+    @override
     def move(self, point_px: Pixel) -> None:
         if self._from is not None:
             self._layer.open_line = [self._from, point_px]
@@ -117,14 +131,23 @@ class EditTool(Tool):
     def _add(self, point_px: Pixel) -> None:
         points = self._layer.open_line
         if points and np.hypot(*np.subtract(points[-1], point_px)) < SAME_POINT_PX:
-            self.cancel()
-            self._do(lambda: self._corrections.add(points))
+            self._end_line()
             return
         if not self._corrections.contains(point_px):
             # Here: at the end it would cost all points clicked.
             self._report("That point is outside the image; click on it.")
             return
         self._layer.open_line = [*points, point_px]
+
+    def _end_line(self) -> None:
+        points = self._layer.open_line
+        self.cancel()
+        self._do(lambda: self._corrections.add(points))
+
+    def finish(self) -> None:
+        """Add the fibre that was clicked and not ended; nothing where it is a point yet."""
+        if self.edit == "add" and len(self._layer.open_line) > 1:
+            self._end_line()
 
     def _join(self, line: Line) -> None:
         first = self._layer.chosen
@@ -198,6 +221,7 @@ class FibreEditor(QWidget):
         column.addWidget(self.note)
 
     def _on_edit(self, button: QToolButton) -> None:
+        self._tool.finish()
         self._tool.cancel()
         self._tool.edit = button.objectName()
         self.view.set_tool(self._tool)
@@ -215,6 +239,7 @@ class FibreEditor(QWidget):
         self._edited(self.corrections.redo)
 
     def _on_save(self) -> None:
+        self._tool.finish()
         try:
             self.note.setText(self._save())
         except CosmicError as exc:
@@ -223,8 +248,14 @@ class FibreEditor(QWidget):
             self._kept = self.corrections.edits
 
     @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        QTimer.singleShot(0, self, lambda: fit_to_screen(self))
+
+    @override
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask first while edits are not kept: nothing brings them back."""
+        self._tool.finish()
         if self.corrections.edits == self._kept:
             super().closeEvent(event)
             return

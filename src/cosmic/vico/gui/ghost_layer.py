@@ -25,6 +25,7 @@ class GhostLayer(Layer):
         self._from_px: Pixel | None = None
         self._forward: Pixel = (1.0, 0.0)
         self._width_px = 0.0
+        self._gap_px = 0.0
 
     def aim(
         self,
@@ -33,6 +34,7 @@ class GhostLayer(Layer):
         from_px: Pixel | None = None,
         forward: Pixel = (1.0, 0.0),
         width_px: float = 0.0,
+        gap_px: float = 0.0,
     ) -> None:
         """Show a tool with its tip at a pixel; None: none.
 
@@ -42,9 +44,11 @@ class GhostLayer(Layer):
             Where its tip is now; None where that is not known.
         forward : Pixel
             Which way the tool points.
+        width_px, gap_px : float
+            How wide it is, or each of its jaws, and how far these are apart.
         """
         self.target_px, self._from_px = target_px, from_px
-        self._forward, self._width_px = forward, width_px
+        self._forward, self._width_px, self._gap_px = forward, width_px, gap_px
 
     def show_answer(self, text: str, *, allowed: bool) -> None:
         """Say what the gate answers."""
@@ -72,16 +76,23 @@ class GhostLayer(Layer):
             label(painter, tip, self.text, colour, QRectF(view.rect()), gap=14.0)
 
     def _outline(self, view: CameraImageView) -> QPainterPath:
-        """Return the front of the tool, as far back as it is wide, three times."""
+        """Return the front of the tool or of its jaws, as far back as it is wide, three times."""
+        off = (self._gap_px + self._width_px) / 2.0 if self._gap_px > 0.0 else 0.0
+        path = QPainterPath()
+        for middle in (-off, off) if off else (0.0,):
+            self._add_front(path, view, middle)
+        return path
+
+    def _add_front(self, path: QPainterPath, view: CameraImageView, middle: float) -> None:
         x, y = self.target_px or (0.0, 0.0)
         length = math.hypot(*self._forward) or 1.0
         ahead, aside = self._forward[0] / length, self._forward[1] / length
         half, back = self._width_px / 2.0, _BACK * self._width_px
+        sides = (middle - half, middle + half)
+        places = ((sides[0], back), (sides[0], 0.0), (sides[1], 0.0), (sides[1], back))
         corners = [
-            (x - side * aside * half - far * ahead, y + side * ahead * half - far * aside)
-            for side, far in ((-1.0, back), (-1.0, 0.0), (1.0, 0.0), (1.0, back))
+            (x - side * aside - far * ahead, y + side * ahead - far * aside) for side, far in places
         ]
-        path = QPainterPath(view.to_screen.map(QPointF(*corners[0])))
+        path.moveTo(view.to_screen.map(QPointF(*corners[0])))
         for corner in corners[1:]:
             path.lineTo(view.to_screen.map(QPointF(*corner)))
-        return path

@@ -131,6 +131,10 @@ class Tool(Protocol):
         """Take the button going down there."""
 
     @abstractmethod
+    def press_again(self, point_px: Pixel) -> None:
+        """Take the second press of a double click, where it means something."""
+
+    @abstractmethod
     def move(self, point_px: Pixel) -> None:
         """Take the mouse coming there, with the button down or not."""
 
@@ -355,6 +359,13 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
             event.accept()  # its menu swallows the release: pyqtgraph took the next drag for its
         else:
             super().mousePressEvent(event)
+
+    @override
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        if self.tool is not None and event.button() == Qt.MouseButton.LeftButton:
+            self._with_tool(self.tool.press_again, event)
+        else:
+            super().mouseDoubleClickEvent(event)
 
     @override
     def mouseMoveEvent(self, event: QMouseEvent) -> None:

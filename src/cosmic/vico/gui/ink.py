@@ -1,10 +1,11 @@
 """Pens and labels that can be seen over any image, bright or dark."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
+from itertools import chain
 from typing import Final
 
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen
 
 from cosmic.frame.gui.palette import OKABE_ITO, ON_IMAGE
@@ -16,6 +17,8 @@ SKY: Final = QColor(OKABE_ITO["sky blue"])
 GREEN: Final = QColor(ON_IMAGE["found"])
 ORANGE: Final = QColor(OKABE_ITO["orange"])
 YELLOW: Final = QColor(OKABE_ITO["yellow"])
+_MOST_STEPS: Final = 6
+"""How many times its height a label goes off before it covers another."""
 PINK: Final = QColor(OKABE_ITO["reddish purple"])
 
 
@@ -64,18 +67,18 @@ def label(
 ) -> QRectF:
     """Write `text` beside a point on a dark ground, inside `room`; returns where it stands.
 
-    It goes below each of the labels `taken` that it would cover.
+    Where a label of `taken` is, it stands at another side of the point, or a little further off:
+    far away it would be read for something else.
     """
     font = ink_font()
     metrics = QFontMetricsF(font)
     width = max(metrics.horizontalAdvance(part) for part in text.splitlines())
     height = metrics.height() * len(text.splitlines())
-    box = QRectF(point.x() + gap, point.y() - height - gap, width + STEP_PX, height + 4.0)
-    box.moveLeft(min(max(box.left(), room.left() + 2), room.right() - box.width() - 2))
-    box.moveTop(min(max(box.top(), room.top() + 2), room.bottom() - box.height() - 2))
-    for other in sorted(taken, key=QRectF.top):
-        if box.intersects(other):
-            box.moveTop(other.bottom() + 2.0)
+    size = QSizeF(width + STEP_PX, height + 4.0)
+    places = _places(point, size, gap, room)
+    first = next(places)
+    free = (box for box in chain((first,), places) if not any(map(box.intersects, taken)))
+    box = next(free, first)
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(ON_IMAGE["label"]))
     painter.drawRoundedRect(box, 3.0, 3.0)
@@ -83,3 +86,15 @@ def label(
     painter.setPen(colour)
     painter.drawText(box, int(Qt.AlignmentFlag.AlignCenter), text)
     return box
+
+
+def _places(point: QPointF, size: QSizeF, gap: float, room: QRectF) -> Iterator[QRectF]:
+    """Yield where a label of a point may stand inside `room`, the nearest places first."""
+    for step in range(_MOST_STEPS):
+        off = gap + step * (size.height() + 2.0)
+        for top in (point.y() - size.height() + 4.0 - off, point.y() + off):
+            for left in (point.x() + gap, point.x() - gap - size.width()):
+                box = QRectF(QPointF(left, top), size)
+                box.moveLeft(min(max(left, room.left() + 2), room.right() - size.width() - 2))
+                box.moveTop(min(max(top, room.top() + 2), room.bottom() - size.height() - 2))
+                yield box

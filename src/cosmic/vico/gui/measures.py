@@ -103,7 +103,7 @@ class MeasureLayer(Layer):
             painter.drawEllipse(each, 3.5, 3.5)
         if measure.text:
             point = points[1] if len(points) == 3 else (points[0] + points[1]) / 2.0
-            text = f"{measure.text} (other zoom)" if other else measure.text
+            text = f"{measure.text} (other scale)" if other else measure.text
             label(painter, point, text, colour, QRectF(view.rect()))
 
 

@@ -30,6 +30,10 @@ class DistanceTool(Tool):
         self._layer.add(self._open)
 
     @override
+    def press_again(self, point_px: Pixel) -> None:
+        """Do nothing: the first press of a double click says all."""
+
+    @override
     def move(self, point_px: Pixel) -> None:
         if self._open is not None:
             self._open.points[1] = point_px
@@ -71,6 +75,10 @@ class AngleTool(Tool):
             self._open.points.append(point_px)
 
     @override
+    def press_again(self, point_px: Pixel) -> None:
+        """Do nothing: the first press of a double click says all."""
+
+    @override
     def move(self, point_px: Pixel) -> None:
         if self._open is not None:
             self._open.points[-1] = point_px
@@ -105,6 +113,9 @@ class RoiTool(QObject):
     def press(self, point_px: Pixel) -> None:
         """Begin a corner."""
         self._begin = self._end = self._inside(point_px)
+
+    def press_again(self, point_px: Pixel) -> None:
+        """Do nothing: the first press of a double click says all."""
 
     def move(self, point_px: Pixel) -> None:
         """Draw the other corner along."""
@@ -181,6 +192,9 @@ class ClickTool(QObject):
         """Begin to aim."""
         self._down = True
         self.aimed.emit(point_px)
+
+    def press_again(self, point_px: Pixel) -> None:
+        """Do nothing: the first press of a double click says all."""
 
     def move(self, point_px: Pixel) -> None:
         """Aim at another point."""

@@ -21,7 +21,7 @@ from cosmic.app.panels.results.campaign_page import CampaignPage
 from cosmic.app.panels.results.pictures import still_pixels
 from cosmic.app.panels.results.session_list import THUMBNAIL, SessionList
 from cosmic.app.panels.results.viewer import ResultViewer
-from cosmic.app.results.sessions import Item, ItemKind
+from cosmic.app.results.sessions import SEEN, Item, ItemKind
 from cosmic.app.results.timeline import Timeline, load_timeline
 from cosmic.autonomy.campaign.records import CampaignError
 from cosmic.autonomy.campaign.storage_format import DATABASE, FIBRES
@@ -194,7 +194,7 @@ class ResultsPanel(QWidget):
         path = self.viewer.path
         if path is None:
             return
-        base = free_base(path.parent, f"{path.stem}_seen")
+        base = free_base(path.parent, f"{path.stem}{SEEN}")
         picture = base.with_name(f"{base.name}.png")  # a name may have full stops of its own
         try:
             if not self.viewer.grab().save(str(picture)):

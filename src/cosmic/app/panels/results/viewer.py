@@ -25,6 +25,7 @@ from PySide6.QtWidgets import (
 from cosmic.app.panels.results.curves import TIME, ResultCurves
 from cosmic.app.panels.results.pictures import ResultPictures
 from cosmic.app.results.timeline import Timeline
+from cosmic.daqco.core.curves import FEWEST_SAMPLES
 from cosmic.daqco.gui.plot.units import display_unit
 from cosmic.frame.background import BackgroundJobs
 from cosmic.frame.gui.amounts import duration_text
@@ -350,12 +351,13 @@ class ResultViewer(QWidget):
         for number, (name, _, _, _) in enumerate(self.curves.lines):
             line = self.curves.slope(number)
             _, what = self.curves.between(number)
-            if line is None:
+            if what.size < FEWEST_SAMPLES:
                 continue
+            slope = f"slope {line.text}" if line is not None else "no slope, it stood still"
             unit = self.curves.unit
             of = f"{name}: " if len(self.curves.lines) > 1 else ""
             texts.append(
-                f"{of}slope {line.text}   "
+                f"{of}{slope}   "
                 f"difference {float(what[-1] - what[0]):.2f} {unit}   "
                 f"mean {float(what.mean()):.2f} {unit}"
             )
