@@ -130,9 +130,8 @@ class Tool(Protocol):
     def press(self, point_px: Pixel) -> None:
         """Take the button going down there."""
 
-    @abstractmethod
     def press_again(self, point_px: Pixel) -> None:
-        """Take the second press of a double click, where it means something."""
+        """Take the second press of a double click; it means nothing to most tools."""
 
     @abstractmethod
     def move(self, point_px: Pixel) -> None:
