@@ -1,5 +1,6 @@
 """Results: finding what was recorded, and looking at force, positions, images and log together."""
 
+import math
 import os
 import signal
 import subprocess
@@ -20,7 +21,14 @@ from PySide6.QtWidgets import QApplication, QGraphicsTextItem
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.results.panel import ResultsPanel
-from cosmic.app.results.sessions import SessionFolder, read_about, sessions_in
+from cosmic.app.results.recording_report import write_recording_report
+from cosmic.app.results.sessions import (
+    About,
+    SessionFolder,
+    read_about,
+    sessions_in,
+    write_about,
+)
 from cosmic.app.results.timeline import Timeline, Track, load_timeline
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.recording_file import RecordingFile
@@ -475,6 +483,55 @@ def test_what_is_seen_is_exported(panel: ResultsPanel, qtbot: QtBot, tmp_path: P
     panel.refresh()
     qtbot.wait(100)
     assert panel.sessions.row_of("push_seen_values") is None  # a table is no film
+
+
+def test_the_report_of_a_recording_holds_what_was_measured_and_what_happened(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "push <1>.h5")
+    write_images(tmp_path / "film")
+    write_about(tmp_path, About(sample="pine & birch", operator="Ann"))
+    panel.refresh()
+    choose(panel, qtbot, "push <1>")
+    opened: list[Path] = []
+    panel.open_file = opened.append
+    qtbot.mouseClick(panel.viewer.report, LEFT)
+    qtbot.waitUntil(lambda: bool(opened))
+    assert opened == [tmp_path / "push <1>_report.html"]
+    page = opened[0].read_text(encoding="utf-8")
+    assert "<h1>push &lt;1&gt;</h1>" in page
+    assert "pine &amp; birch" in page
+    assert "Ann" in page
+    assert f"{(4.0 * RATE_HZ - 1) / RATE_HZ * SLOPE:.2f} µN" in page, "the highest force"
+    assert "force over time, s" in page
+    assert "force over left.x, µm" in page
+    assert "touched" in page
+    assert "Microscope at the highest force, after 4.00 s." in page
+    assert "data:image/png;base64," in page
+    assert panel.sessions.row_of("push <1>_report") is None
+
+
+@pytest.mark.parametrize("value", [1.0, math.nan])
+def test_a_force_that_never_changed_or_was_never_known_has_a_report(
+    tmp_path: Path, value: float
+) -> None:
+    values = np.full(50, value)
+    track = Track("force", "uN", np.linspace(0.0, 1.0, 50), values, values, values)
+    shown = Timeline(tmp_path / "flat.h5", 0.0, 1.0, BEGUN, RATE_HZ, (track,))
+    write_recording_report(shown, About(), tmp_path / "flat.html")
+    assert "Nothing was noted." in (tmp_path / "flat.html").read_text(encoding="utf-8")
+
+
+def test_a_report_that_cannot_be_written_says_so(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_force(tmp_path / "push.h5")
+    (tmp_path / "push_report.html").mkdir()
+    panel.refresh()
+    choose(panel, qtbot, "push")
+    panel.open_file = pytest.fail
+    qtbot.mouseClick(panel.viewer.report, LEFT)
+    qtbot.waitUntil(lambda: "cannot be written" in panel.message.text())
 
 
 def test_what_was_exported_is_no_recording_and_leaves_the_day_of_its_session(

@@ -130,8 +130,9 @@ class Tool(Protocol):
     def press(self, point_px: Pixel) -> None:
         """Take the button going down there."""
 
+    @abstractmethod
     def press_again(self, point_px: Pixel) -> None:
-        """Take the second press of a double click; it means nothing to most tools."""
+        """Take the second press of a double click, where it means something."""
 
     @abstractmethod
     def move(self, point_px: Pixel) -> None:

@@ -30,6 +30,10 @@ class DistanceTool(Tool):
         self._layer.add(self._open)
 
     @override
+    def press_again(self, point_px: Pixel) -> None:
+        """Do nothing: the first press of a double click says all."""
+
+    @override
     def move(self, point_px: Pixel) -> None:
         if self._open is not None:
             self._open.points[1] = point_px
@@ -69,6 +73,10 @@ class AngleTool(Tool):
             self._open = None
         else:
             self._open.points.append(point_px)
+
+    @override
+    def press_again(self, point_px: Pixel) -> None:
+        """Do nothing: the first press of a double click says all."""
 
     @override
     def move(self, point_px: Pixel) -> None:

@@ -21,7 +21,7 @@ from cosmic.app.panels.results.campaign_page import CampaignPage
 from cosmic.app.panels.results.pictures import still_pixels
 from cosmic.app.panels.results.session_list import THUMBNAIL, SessionList
 from cosmic.app.panels.results.viewer import ResultViewer
-from cosmic.app.results.sessions import SEEN, Item, ItemKind
+from cosmic.app.results.sessions import SEEN, Item, ItemKind, read_about
 from cosmic.app.results.timeline import Timeline, load_timeline
 from cosmic.autonomy.campaign.records import CampaignError
 from cosmic.autonomy.campaign.storage_format import DATABASE, FIBRES
@@ -82,6 +82,7 @@ class ResultsPanel(QWidget):
         self.sessions.again.clicked.connect(self._read_campaign)
         self.viewer = ResultViewer(self._jobs, model)
         self.viewer.export_requested.connect(self.export)
+        self.viewer.report_requested.connect(self.open_recording_report)
         self.message = named(ElidedLabel(), "resultsMessage")
         self.message.clicked.connect(self._open_written)
         self._written: Path | None = None
@@ -231,6 +232,23 @@ class ResultsPanel(QWidget):
                     write_report(CampaignReader(folder), page)
             except OSError as exc:
                 raise CampaignError(f"{page} cannot be written: {exc}") from exc
+            return page
+
+        self._jobs.do(report, self._reported)
+
+    def open_recording_report(self) -> None:
+        """Write the report of the recording that is shown beside it, and open it."""
+        shown = self.viewer.timelines
+        if not shown:
+            return
+        self.message.set_text("writing the report")
+
+        def report() -> Path:
+            # Imported here: reports load statistics.
+            from cosmic.app.results.recording_report import report_path, write_recording_report
+
+            page = report_path(shown[0].path)
+            write_recording_report(shown[0], read_about(shown[0].path.parent), page)
             return page
 
         self._jobs.do(report, self._reported)

@@ -65,9 +65,12 @@ class ResultViewer(QWidget):
     -------
     export_requested()
         What is seen is to be written.
+    report_requested()
+        The report of the recording is wanted.
     """
 
     export_requested = Signal()
+    report_requested = Signal()
 
     def __init__(
         self,
@@ -116,6 +119,9 @@ class ResultViewer(QWidget):
         tip = "Write what is seen: an image of it, and the values between the cursors"
         self.export = self._button("Export", tip, "resultsExport")
         self.export.clicked.connect(self.export_requested)
+        tip = "Open the report of this recording: force, what happened, sample and operator"
+        self.report = self._button("Report", tip, "resultsReport")
+        self.report.clicked.connect(self.report_requested)
         self.slider = named(QSlider(Qt.Orientation.Horizontal), "resultsSlider")
         self.slider.setRange(0, STEPS)
         self.slider.setSingleStep(STEPS // 200)
@@ -160,7 +166,7 @@ class ResultViewer(QWidget):
         self._over.setProperty("role", "dim")
         second.addWidget(self._over)
         second.addWidget(self.across)
-        for each in (self.near, self.whole, self.fibres, self.export):
+        for each in (self.near, self.whole, self.fibres, self.export, self.report):
             second.addWidget(each)
         second.addWidget(self.moment, 1)
         column = QVBoxLayout(self)
@@ -254,7 +260,7 @@ class ResultViewer(QWidget):
         self.play.setEnabled(long)
         self.slider.setEnabled(long)
         forces = bool(first and first.forces)
-        for button in (self.near, self.whole):
+        for button in (self.near, self.whole, self.report):
             button.setVisible(forces)
         for each in (self.channel, self.across, self._over):
             each.setVisible(forces)
