@@ -1,5 +1,6 @@
 """Results: finding what was recorded, and looking at force, positions, images and log together."""
 
+import base64
 import math
 import os
 import signal
@@ -43,7 +44,7 @@ from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.core.recording.formats import ImageFormat
 from cosmic.vico.core.recording.image_file import ImageFile
 from cosmic.vico.core.recording.side_row import row_of
-from cosmic.vico.hw.interface import Frame
+from cosmic.vico.hw.interface import Frame, PixelFormat
 from gui.app.test_workspaces import clipped, overlapping
 
 LEFT = Qt.MouseButton.LeftButton
@@ -520,6 +521,27 @@ def test_a_force_that_never_changed_or_was_never_known_has_a_report(
     shown = Timeline(tmp_path / "flat.h5", 0.0, 1.0, BEGUN, RATE_HZ, (track,))
     write_recording_report(shown, About(), tmp_path / "flat.html")
     assert "Nothing was noted." in (tmp_path / "flat.html").read_text(encoding="utf-8")
+
+
+def test_the_image_of_a_report_is_seen_where_a_camera_gives_12_bits(tmp_path: Path) -> None:
+    write_force(tmp_path / "push.h5")
+    file = ImageFile(tmp_path / "film", ImageFormat.PNG)
+    for number in range(5):
+        time_s = START_S + number
+        data = np.tile(np.linspace(0, 4095, 96).astype(np.uint16), (64, 1))
+        frame = Frame(data, number, time_s, time_s, pixel_format=PixelFormat.MONO12)
+        image = CameraImage("Microscope", frame, Circumstances())
+        file.append(data, row_of(image, BEGUN + timedelta(seconds=number)))
+    file.close(complete=True)
+    items = [each for session in sessions_in([tmp_path]) for each in session.items]
+    force = next(each for each in items if each.name.startswith("push"))
+    write_recording_report(load_timeline(force, items), About(), tmp_path / "push.html")
+    page = (tmp_path / "push.html").read_text(encoding="utf-8")
+    content = page.split("data:image/png;base64,")[1].split('"')[0]
+    shown = cv2.imdecode(np.frombuffer(base64.b64decode(content), np.uint8), cv2.IMREAD_UNCHANGED)
+    assert shown.dtype == np.uint8
+    assert shown.min() < 10
+    assert shown.max() > 245
 
 
 def test_a_report_that_cannot_be_written_says_so(

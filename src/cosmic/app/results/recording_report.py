@@ -19,6 +19,7 @@ from cosmic.frame.errors import CosmicError, RecordingError
 from cosmic.frame.kept_file import write_whole
 from cosmic.frame.units import with_micro_signs
 from cosmic.vico.core.recording.reading import open_image_recording
+from cosmic.vico.hw.interface import PixelFormat
 
 TEMPLATES: Final = Path(__file__).parent / "templates"
 ENDING: Final = "_report.html"
@@ -227,9 +228,14 @@ def _png(film: Film, at_s: float) -> bytes:
     import cv2
 
     with open_image_recording(film.path) as images:
-        pixels = images[film.index_at(at_s)].data
+        recorded = images[film.index_at(at_s)]
+    pixels = recorded.data
     if pixels.ndim == 3:
         pixels = pixels[..., ::-1]
+    if pixels.dtype.itemsize > 1:  # of 12 bits in 16 nothing would be seen
+        coded = recorded.row and PixelFormat(recorded.row.pixel_format)
+        full = coded.full_scale if coded else max(int(pixels.max()), 1)
+        pixels = np.minimum(255.0 / full * pixels, 255.0).astype(np.uint8)
     scale = min(1.0, IMAGE_PX / pixels.shape[1])
     small = cv2.resize(pixels, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     found, data = cv2.imencode(".png", small)
