@@ -209,3 +209,7 @@ def test_a_signal_ends_the_command_and_its_window(qtbot: QtBot, tmp_path: Path) 
     assert cv2.imwrite(str(file), IMAGE)
     QTimer.singleShot(500, lambda: signal.raise_signal(signal.SIGTERM))
     assert main(["correct", str(file)]) == 143
+    QApplication.processEvents()
+    came: list[bool] = []
+    QTimer.singleShot(20, lambda: came.append(True))
+    qtbot.waitUntil(lambda: bool(came), timeout=2000)  # no quit is left for whoever began it

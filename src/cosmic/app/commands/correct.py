@@ -85,13 +85,15 @@ def _shown(app: "QApplication", editor: "QWidget", chosen: argparse.Namespace) -
 
     def end(name: str) -> None:
         """Close it, which asks where edits are not kept; the second signal does not ask."""
-        if asked or editor.close():
-            app.quit()
+        if asked:
+            app.exit(0)
+        else:
+            editor.close()  # ends `exec`, as the last window; one more quit would stay behind
         asked.append(name)
 
     editor.show()
     if chosen.offscreen is not None:
-        QTimer.singleShot(round(1000 * chosen.offscreen), app.quit)
+        QTimer.singleShot(round(1000 * chosen.offscreen), lambda: app.exit(0))
     with held_back(end):
         code = app.exec()
     if chosen.offscreen is None:
