@@ -51,6 +51,16 @@ def join_outputs(daqco: DaqcoApplication, mico: Mico) -> None:
     daqco.stopped_outside = lambda: mico.stop_state.reason or ""
 
 
+def join_lens(vico: VicoApplication, mico: Mico) -> None:
+    """Have a stop of MiCo stop the motors of the lens as well: whoever stops wants all at rest."""
+
+    def follow(state: StopState) -> None:
+        if state.reason is not None:
+            vico.stop_lens()
+
+    mico.follow_stop(follow)
+
+
 def join_force_cautions(daqco: DaqcoApplication, mico: MicoApplication) -> None:
     """Have undo and initialisation ask where a force is felt beyond ``[mico.undo] felt_un``.
 

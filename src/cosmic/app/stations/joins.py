@@ -13,6 +13,7 @@ from cosmic.autonomy.interlocks import (
     join_exposures,
     join_force_cautions,
     join_force_limits,
+    join_lens,
     join_outputs,
     join_positions,
     join_stage_positions,
@@ -55,7 +56,9 @@ def join_vision(vico: VicoApplication, mico: MicoApplicationBase, path: Path) ->
     path : Path
         The platform file, beside which calibrations are kept.
     """
-    join_stage_positions(vico, mico_of(mico, SOURCE))
+    api = mico_of(mico, SOURCE)
+    join_stage_positions(vico, api)
+    join_lens(vico, api)
     kept_in = vico.settings.calibration
     folder = path.parent / kept_in if kept_in else None
     join_transform(vico, mico, folder, __version__)

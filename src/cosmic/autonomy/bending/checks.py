@@ -6,12 +6,13 @@ with follows from noise, stroke and stiffness.
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
+from cosmic.autonomy.bending.bent_shape import ShapeFit
 from cosmic.autonomy.bending.inference import (
     UNLIKELY,
     VARIATIONS,
@@ -67,9 +68,20 @@ WORDS: Final = {
 
 
 def checked(
-    result: BendingResult, readings: Readings, assessed: Assessed, settings: FitSettings
+    result: BendingResult,
+    readings: Readings,
+    assessed: Assessed,
+    settings: FitSettings,
+    *,
+    seen: Mapping[int, ShapeFit],
 ) -> BendingResult:
-    """Return the result with its flags, whether it is trusted, and why not."""
+    """Return the result with its flags, whether it is trusted, and why not.
+
+    Parameters
+    ----------
+    seen : mapping of int to ShapeFit
+        What images say of spans, by their number.
+    """
     flags: set[Quality] = set()
     reasons = [
         f"span {number + 1} at {fit.place_um:.0f} um: {', '.join(sorted(spoilt))}"
@@ -99,6 +111,10 @@ def checked(
             "the interval ends where depths are not weighed any more: something else may make "
             "short spans soft"
         )
+    for number, shape in seen.items():
+        if shape.problem:
+            flags.add(Quality.SHAPE)
+            reasons.append(f"span {number + 1}: {shape.problem}")
     used = [result.spans[n] for n in result.used]
     cause = _cause(used, readings, assessed, settings)
     if cause is not None:

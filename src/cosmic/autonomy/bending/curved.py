@@ -146,7 +146,7 @@ class NaturalShape:
         """
         along, _ = self._arms
         slope = math.tan(self.slope_rad - turned_rad)
-        x, y = self._places(along)
+        x, y = self.places_um(along)
         arms = (x[-1] - x) + (y[-1] - y) * slope
         rubbed = (x[-1] - x) * slope - (y[-1] - y)
         # Between the jaws the fibre is straight.
@@ -163,7 +163,7 @@ class NaturalShape:
     def _arms(self) -> tuple[Floats, Floats]:
         end = self._arc_at(self.at_um)
         along = np.unique(np.concatenate([[0.0], self._arcs[self._arcs < end], [end]]))
-        x, y = self._places(along)
+        x, y = self.places_um(along)
         return along, (x[-1] - x) + (y[-1] - y) * math.tan(self.slope_rad)
 
     def moved(self, *, ahead_um: float = 0.0, turned_rad: float = 0.0) -> "NaturalShape":
@@ -227,8 +227,11 @@ class NaturalShape:
     def _arc_at(self, ahead_um: float) -> float:
         return float(np.interp(ahead_um, self.ahead_um, self._arcs))
 
-    def _places(self, along: Floats) -> tuple[Floats, Floats]:
-        """Return places along the fibre; straight on beyond its end, and between the jaws."""
+    def places_um(self, along: Floats) -> tuple[Floats, Floats]:
+        """Return where places along the fibre lie, from the jaws' tip: ahead and aside.
+
+        Straight on beyond its end, and between the jaws.
+        """
         arcs = self._arcs
         over = np.maximum(along - arcs[-1], 0.0)
         last = self.ahead_um[-1] - self.ahead_um[-2], self.aside_um[-1] - self.aside_um[-2]
@@ -238,7 +241,7 @@ class NaturalShape:
         return x, y
 
     def _chords(self, along: Floats) -> npt.NDArray[np.complex128]:
-        before, after = self._places(along - DIRECTION_UM), self._places(along + DIRECTION_UM)
+        before, after = self.places_um(along - DIRECTION_UM), self.places_um(along + DIRECTION_UM)
         return np.asarray((after[0] - before[0]) + 1j * (after[1] - before[1]))
 
 

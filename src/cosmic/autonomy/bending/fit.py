@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.autonomy.bending.bent_shape import ShapeFit, fitted_shape
 from cosmic.autonomy.bending.budget import budget_of
 from cosmic.autonomy.bending.checks import checked
 from cosmic.autonomy.bending.curved import NaturalShape
@@ -14,6 +15,7 @@ from cosmic.autonomy.bending.holds import UNKNOWN_HOLDS, Holds, holds_of
 from cosmic.autonomy.bending.inference import (
     DRIFT,
     FRICTION,
+    Posterior,
     Readings,
     common_prior,
     off_model,
@@ -44,6 +46,8 @@ from cosmic.autonomy.bending.standards import (
 NEAR: Final = 0.03
 """Of friction: what spans were fitted about stands for so much more and less."""
 NORMAL_95: Final = 1.96
+MET_STD_UM: Final = 1.0
+"""Of where the probe met the fibre, by the rise of the force."""
 LEAST_RUB, MOST_RUB = 0.02, 0.8
 """Friction that curves are laid out for."""
 
@@ -432,7 +436,31 @@ def _concluded(
         budget=budget_of(readings, assessed.common, settings, posterior, assessed.evidence),
         scale_verified=verified,
     )
-    return checked(result, readings, assessed, settings)
+    return checked(result, readings, assessed, settings, seen=_seen_bent(fibre, posterior))
+
+
+def _seen_bent(fibre: MeasuredFibre, posterior: Posterior) -> dict[int, ShapeFit]:
+    """Return what images say of the spans to stand on, by the number of the span."""
+    found, settings = {}, fibre.settings
+    for number in fibre.used:
+        span, bent = fibre.raw[number], fibre.raw[number].bent
+        if bent is None or span.shape is None:
+            continue
+        gives_um = bent.force_un * (1.0 / settings.sensor_un_um + 1.0 / settings.jaw_un_um)
+        pushed_um = bent.probe_um - fibre.spans[number].hinge_um - gives_um
+        shape = fitted_shape(
+            bent,
+            span.shape,
+            pushed_um=pushed_um,
+            pushed_std_um=math.hypot(MET_STD_UM, gives_um),
+            depth_um=posterior.depth_um,
+            depth_std_um=posterior.depth_std_um,
+            variation=posterior.variation,
+            length_um=settings.ei_length_um,
+        )
+        if shape is not None:
+            found[number] = shape
+    return found
 
 
 def _with_off_model(

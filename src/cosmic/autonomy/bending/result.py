@@ -41,6 +41,7 @@ class Quality(StrEnum):
     CLAMP_DEEP = "clamped deep in the jaws"
     MOVED = "contact moved"
     NOT_A_FIBRE = "not a fibre"
+    SHAPE = "image and force disagree"
 
 
 COMMON_SOURCES: Final = (

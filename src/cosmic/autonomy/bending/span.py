@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.autonomy.bending.bent_shape import BentShape
 from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.frame.renamed import renamed_fields
 
@@ -64,6 +65,8 @@ class Span:
         a straight fibre that gives way as much.
     freed : Freed or None
         What was read on the way out once friction was made to let go; None: it was not.
+    bent : BentShape or None
+        What an image shows at the farthest point; None: none was taken.
     """
 
     nominal_um: float
@@ -76,3 +79,4 @@ class Span:
     loading: npt.NDArray[np.bool_]
     shape: NaturalShape | None = None
     freed: Freed | None = None
+    bent: BentShape | None = None

@@ -12,6 +12,7 @@ from typing import Any, Final
 import h5py
 import numpy as np
 
+from cosmic.autonomy.bending.bent_shape import BentShape
 from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.bending.result import BendingResult, Contribution, Kind, Quality, SpanFit
 from cosmic.autonomy.bending.span import Freed, Span
@@ -453,6 +454,15 @@ def _put_span(group: h5py.Group, span: Span) -> None:
                 "wait_s": span.freed.wait_s,
             }
         )
+    if span.bent is not None:
+        group["bent_um"] = np.column_stack([span.bent.ahead_um, span.bent.aside_um])
+        group["bent_um"].attrs.update(
+            {
+                "std_um": span.bent.std_um,
+                "probe_um": span.bent.probe_um,
+                "force_un": span.bent.force_un,
+            }
+        )
 
 
 def read_curves(path: Path) -> tuple[tuple[Span, ...], tuple[Floats, ...], tuple[Series, ...]]:
@@ -496,6 +506,7 @@ def _measured_span(group: h5py.Group) -> Span:
         loading=np.asarray(group["loading"], dtype=np.bool_),
         shape=_natural_shape(group),
         freed=_freed(group),
+        bent=_bent(group),
     )
 
 
@@ -509,6 +520,20 @@ def _freed(group: h5py.Group) -> Freed | None:
         down_un=np.asarray(group["freed_down_un"], dtype=np.float64),
         std_un=float(facts["std_un"]),
         wait_s=float(facts["wait_s"]),
+    )
+
+
+def _bent(group: h5py.Group) -> BentShape | None:
+    if "bent_um" not in group:  # not looked at, or written before it was
+        return None
+    ahead, aside = np.asarray(group["bent_um"], dtype=np.float64).reshape(-1, 2).T
+    facts = group["bent_um"].attrs
+    return BentShape(
+        ahead_um=ahead,
+        aside_um=aside,
+        std_um=float(facts["std_um"]),
+        probe_um=float(facts["probe_um"]),
+        force_un=float(facts["force_un"]),
     )
 
 

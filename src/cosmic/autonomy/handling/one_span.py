@@ -1,13 +1,16 @@
 """One push of one span: the probe finds the fibre, bends it, lets it go, and keeps what it read."""
 
+import logging
 from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
+from cosmic.autonomy.bending.bent_shape import BentShape
 from cosmic.autonomy.bending.plan import PlannedSpan
 from cosmic.autonomy.bending.span import Freed, Span
+from cosmic.autonomy.handling.bent_image import FibreSeen, HeldLine
 from cosmic.autonomy.handling.careful_move import CarefulMove
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
@@ -18,6 +21,10 @@ from cosmic.autonomy.handling.retrying_move import RetryingMove
 from cosmic.autonomy.handling.settings import PushSettings
 from cosmic.autonomy.handling.surface import Contact, foresee_off
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps, Yielded
+from cosmic.frame.errors import DeviceError, NotAvailable
+from cosmic.vico.core.image import CameraImage
+
+logger = logging.getLogger(__name__)
 
 NO_CONTACT: Final = "no contact"
 TOO_HIGH: Final = "force too high"
@@ -99,9 +106,12 @@ class OneSpan:
         self._probe = work.probe
         self._points = _Points()
         self._freed: Freed | None = None
+        self._unpushed: FibreSeen | None = None
+        self._bent: BentShape | None = None
         self._shape = shape_of(work, fibre)
         self._slope = self._shape.slope_at(plan.span_um)
         self._first = fibre.zero_un is None
+        self._longest = not (fibre.spans or fibre.standard)
         # The probe pushes along its own direction; way grows as it does.
         self._sign = 1.0 if work.probe.forward[1] > 0.0 else -1.0
 
@@ -116,6 +126,8 @@ class OneSpan:
         try:
             yield from self._go_in_front()
             base = yield from self._baseline()
+            if self._push.witness and self._longest:
+                self._unpushed = yield from self._look(0.0)
             contact = yield from self._search(base)
             if self._first and self._push.rest_s > 0.0:
                 yield from self._rest(contact)
@@ -123,6 +135,7 @@ class OneSpan:
             yield from self._out(base, contact)
             self._place_contact(contact)
             yield from self._dwell()
+            yield from self._see_bent(base, contact)
             yield from self._back(contact)
         except OperationFailed as failure:
             if failure.cause == TOO_HIGH:
@@ -391,6 +404,30 @@ class OneSpan:
             yield push.dwell_s / push.dwell_looks
             yield from self._measure(push.average_s, loading=True)
 
+    def _look(self, pushed_um: float) -> Generator[Yielded, object, FibreSeen | None]:
+        """Return where an image shows the fibre; None where there is none to be had."""
+        work, fibre = self._work, self._fibre
+        line = HeldLine(work, self._shape, self._plan.span_um, fibre.width_um, self._sign)
+        try:
+            image = yield work.image()
+            assert isinstance(image, CameraImage)
+            return line.seen(image, pushed_um)
+        except (NotAvailable, DeviceError) as exc:
+            logger.warning("fibre %d: its bent shape is not looked at: %s", fibre.number, exc)
+            return None
+
+    def _see_bent(self, base_un: float, contact_um: float) -> Steps:
+        """Keep how an image shows the fibre bent at the farthest point: a second witness."""
+        if self._unpushed is None:
+            return
+        points = self._points
+        probe_um, force_un = points.probe_um[-1], points.force_un[-1] - base_un
+        after = yield from self._look(probe_um - self._met_um(contact_um))
+        if after is not None:
+            fibre, span_um = self._fibre, self._plan.span_um
+            line = HeldLine(self._work, self._shape, span_um, fibre.width_um, self._sign)
+            self._bent = line.bent(self._unpushed, after, probe_um=probe_um, force_un=force_un)
+
     def _back(self, contact_um: float) -> Steps:
         push = self._push
         top, end = self._points.probe_um[-1], contact_um - push.retreat_um / 2.0
@@ -429,6 +466,7 @@ class OneSpan:
                 loading=np.array(points.loading, dtype=np.bool_),
                 shape=shape,
                 freed=self._freed,
+                bent=self._bent,
             )
         )
 

@@ -221,6 +221,9 @@ class PushSettings(StrictModel):
         How far a fibre that is pressed by a quarter of that, or by half of its push, is slid up and
         down the probe, and back to where it was, so that friction lets go of it (0: it is not); at
         every how many spans; and from which force above the baseline on.
+    witness : bool
+        The longest push is looked at in an image, before and at its end: the shape of the fibre
+        there has to agree with the force.
     rest_s : float
         How long stages that came from far rest before the first push of a fibre.
     retreat_um : float
@@ -260,6 +263,7 @@ class PushSettings(StrictModel):
     slide_um: float = Field(10.0, ge=0.0, le=20.0)
     slide_every: int = Field(2, ge=1)
     slide_un: float = Field(1.2, gt=0.0)
+    witness: bool = True
     rest_s: float = Field(2.0, ge=0.0, le=60.0)
     retreat_um: float = Field(12.0, gt=0.0)
     tilt_um: float = Field(55.0, ge=0.0)

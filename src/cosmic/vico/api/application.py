@@ -76,6 +76,7 @@ class VicoApplication(TaskApplication):
         self.sample_source: Callable[[str, float], tuple[int, float] | None] | None = None
         self.transform: CoordinateTransform | None = None
         self.found: tuple[CameraInfo, ...] = ()
+        self.focus_search: Task | None = None
         self.peripherals = PeripheralThread(
             open_lens, open_light, clock, policy, timeout_s=settings.lens.timeout_s
         )
@@ -147,6 +148,12 @@ class VicoApplication(TaskApplication):
         task = Task(f"{camera}: {key}")
         task.finish()
         return task
+
+    def stop_lens(self) -> None:
+        """Stop both motors of the lens and whatever moves them; returns at once."""
+        if self.focus_search is not None:
+            self.focus_search.cancel()
+        self.peripherals.abort()
 
     @property
     def has_lens(self) -> bool:

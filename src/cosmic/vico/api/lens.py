@@ -21,7 +21,6 @@ class LensHandle(Declared):
     def __init__(self, application: VicoApplication) -> None:
         self._application = application
         self._thread = application.peripherals
-        self._search: Task | None = None
 
     @property
     @override
@@ -137,20 +136,19 @@ class LensHandle(Declared):
         unit = application.unit(camera or application.first_camera)
         if not unit.config.behind_lens:
             raise NotAvailable(f"{unit.config.name} has a lens of its own; there is no motor")
-        self._search = application.begin(
+        search = application.begin(
             f"Autofocus of {unit.config.name}",
             lambda task: Autofocus(
                 task, unit, self._thread, application.clock, application.focus_models
             ).run(),
         )
-        return self._search
+        application.focus_search = search
+        return search
 
     @command(at_once=True)
     def abort(self) -> None:
         """Stop both motors and whatever moves them."""
-        if self._search is not None:
-            self._search.cancel()
-        self._thread.abort()
+        self._application.stop_lens()
 
     @command
     def reopen(self) -> Task:

@@ -1,0 +1,174 @@
+"""How far aside images show a held fibre while it is pushed, place by place."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.autonomy.bending.bent_shape import BentShape
+from cosmic.autonomy.handling.context import HandlingContext
+from cosmic.autonomy.handling.grasp import HeldShape
+from cosmic.vico.core.image import CameraImage
+from cosmic.vico.core.pixel_map import Floats
+from cosmic.vico.core.vision.algorithms import grey
+
+NEAR_JAWS_UM: Final = 70.0
+NEAR_PROBE_UM: Final = 70.0
+"""Jaws and probe are as dark as the fibre: nothing is looked for so near to them."""
+APART_PX: Final = 2.0
+"""Between two places: nearer ones share the same pixels."""
+FINE_PX: Final = 0.25
+SLACK_PX: Final = 3.0
+"""So far from where it is foreseen a fibre is looked for."""
+GROUND_PERCENT: Final = 75
+LEAST_DARK_PART: Final = 0.5
+"""Of how dark the fibre is in the middle of its places: what is fainter is not it."""
+LEAST_STD_PX: Final = 0.08
+ROUNDS: Final = 4
+OFF_SIGMAS: Final = 5.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FibreSeen:
+    """Where a held fibre runs in one image.
+
+    Attributes
+    ----------
+    aside_um : ndarray, shape (n,), float64
+        Of each place, the way of the push, beside where it should run unpushed.
+    dark : ndarray, shape (n,), float64
+        How much darker than the ground it is there, grey levels.
+    scale_um_px : float
+    """
+
+    aside_um: Floats
+    dark: Floats
+    scale_um_px: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldLine:
+    """A fibre in the jaws as it should run, and the way it is pushed.
+
+    Attributes
+    ----------
+    span_um : float
+        Where the probe stands, from the tip of the jaws.
+    width_um : float
+        Of the fibre.
+    sign : float
+        1 where the push goes to growing y.
+    """
+
+    work: HandlingContext
+    shape: HeldShape
+    span_um: float
+    width_um: float
+    sign: float
+
+    def places_um(self, scale_um_px: float) -> Floats:
+        """Return where along the jaws the fibre is looked for."""
+        return np.arange(NEAR_JAWS_UM, self.span_um - NEAR_PROBE_UM, APART_PX * scale_um_px)
+
+    def seen(self, image: CameraImage, pushed_um: float = 0.0) -> FibreSeen:
+        """Return where it runs in an image, near where it is foreseen.
+
+        Parameters
+        ----------
+        pushed_um : float
+            How far it was pushed at the probe.
+        """
+        work = self.work
+        mapped = work.mapped_near(image, work.hold_tip_um)
+        scale = mapped.scale_um_px
+        ahead = self.places_um(scale)
+        part = ahead / self.span_um
+        foreseen = pushed_um * part**2 * (1.5 - 0.5 * part)
+        half_px = 0.5 * self.width_um / scale
+        offsets_px = np.arange(
+            -SLACK_PX - 2.5 * half_px - 2.0, SLACK_PX + 2.5 * half_px + 2.0, FINE_PX
+        )
+        x, y = work.tip_now(work.gripper)
+        bows = np.array([self.shape.bow_um(float(each)) for each in ahead])
+        middle = y + bows + self.sign * foreseen
+        across = middle[:, None] + self.sign * scale * offsets_px[None, :]
+        along = np.broadcast_to((x + work.jaws.forward * ahead)[:, None], across.shape)
+        points_px = mapped.to_px(np.column_stack([along.ravel(), across.ravel()]))
+        greys = _greys(image, points_px).reshape(across.shape)
+        found = [_darkest(offsets_px, each, half_px) for each in greys]
+        off_px, dark = np.array(found).reshape(-1, 2).T
+        return FibreSeen(foreseen + scale * off_px, dark, scale)
+
+    def bent(
+        self, before: FibreSeen, after: FibreSeen, *, probe_um: float, force_un: float
+    ) -> BentShape:
+        """Return how far it was bent between two images, where both show it."""
+        ahead = self.places_um(after.scale_um_px)
+        aside = after.aside_um - before.aside_um
+        good = np.isfinite(aside) & np.isfinite(before.dark) & np.isfinite(after.dark)
+        for each in (before, after):
+            typical = float(np.median(each.dark[good])) if good.any() else np.inf
+            good &= each.dark > LEAST_DARK_PART * typical
+        ahead, aside = ahead[good], aside[good]
+        std = max(_scatter(aside), LEAST_STD_PX * after.scale_um_px)
+        kept = _smooth(ahead, aside, std)
+        return BentShape(ahead[kept], aside[kept], std, probe_um, force_un)
+
+
+def _greys(image: CameraImage, points_px: Floats) -> Floats:
+    """Return the brightness at places between pixels; nan off the image."""
+    import cv2  # imported here: it takes a while
+
+    pixels = grey(image.data).astype(np.float32)
+    places = points_px.astype(np.float32).reshape(1, -1, 2)
+    found = cv2.remap(
+        pixels,
+        places[..., 0],
+        places[..., 1],
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=(float("nan"),),
+    )
+    return np.asarray(found.ravel(), dtype=np.float64)
+
+
+def _darkest(offsets_px: Floats, greys: Floats, half_px: float) -> tuple[float, float]:
+    """Return where across a line the middle of something dark is, and how dark; nan: nowhere."""
+    if not np.isfinite(greys).all():
+        return np.nan, np.nan
+    dark = np.clip(float(np.percentile(greys, GROUND_PERCENT)) - greys, 0.0, None)
+    wide = max(1, round(half_px / FINE_PX))
+    smooth = np.convolve(dark, np.ones(wide) / wide, mode="same")
+    near = np.abs(offsets_px) <= SLACK_PX
+    middle = float(offsets_px[int(np.argmax(np.where(near, smooth, -1.0)))])
+    spread = max(1.5, half_px)
+    for _ in range(ROUNDS):
+        weights = dark * np.exp(-0.5 * ((offsets_px - middle) / spread) ** 2)
+        total = float(weights.sum())
+        if not total > 0.0:
+            return np.nan, np.nan
+        middle = float(weights @ offsets_px) / total
+    return middle, float(np.interp(middle, offsets_px, smooth))
+
+
+def _scatter(values: Floats) -> float:
+    """Return the standard deviation of single values about a smooth line through them."""
+    if len(values) < 4:
+        return np.inf
+    turns = values[2:] - 2.0 * values[1:-1] + values[:-2]
+    return float(1.4826 * np.median(np.abs(turns)) / np.sqrt(6.0))
+
+
+def _smooth(ahead_um: Floats, aside_um: Floats, std_um: float) -> npt.NDArray[np.bool_]:
+    """Return which values lie near a smooth line through all: others show something else."""
+    if len(ahead_um) < 6:
+        return np.zeros(len(ahead_um), dtype=np.bool_)
+    kept = np.ones(len(ahead_um), dtype=np.bool_)
+    part = ahead_um / ahead_um[-1]
+    for _ in range(2):
+        line = np.polynomial.Polynomial.fit(part[kept], aside_um[kept], 4)
+        kept = np.abs(aside_um - line(part)) < OFF_SIGMAS * max(std_um, 0.3)
+        if kept.sum() < 6:
+            break
+    return kept
