@@ -123,9 +123,9 @@ def checked(
     notes = _notes(result, readings, assessed) | _spoilt(result)
     excess = _excess(assessed)
     if cause is None and excess > 1.0:
-        seen = _misfit(used, readings, assessed, settings)
-        notes.add(seen)
-        reasons.append(f"{WORDS[seen]}; the interval is {math.sqrt(excess):.1f} times wider")
+        likely = _misfit(used, readings, assessed, settings)
+        notes.add(likely)
+        reasons.append(f"{WORDS[likely]}; the interval is {math.sqrt(excess):.1f} times wider")
     return replace(
         result,
         flags=frozenset(flags),

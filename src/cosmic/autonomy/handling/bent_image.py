@@ -19,6 +19,8 @@ NEAR_PROBE_UM: Final = 70.0
 APART_PX: Final = 2.0
 """Between two places: nearer ones share the same pixels."""
 FINE_PX: Final = 0.25
+CLEAR_PX: Final = 2.0
+"""So far from its edge a fibre is dark no more, out of focus though it may be."""
 SLACK_PX: Final = 3.0
 """So far from where it is foreseen a fibre is looked for."""
 GROUND_PERCENT: Final = 75
@@ -27,6 +29,12 @@ LEAST_DARK_PART: Final = 0.5
 LEAST_STD_PX: Final = 0.08
 ROUNDS: Final = 4
 OFF_SIGMAS: Final = 5.0
+SQRT_2: Final = 2.0**0.5
+AROUND: Final = 4
+"""So many steps to both sides show how steep the line is."""
+LEAST_PLACES: Final = 8
+BESIDE_PART: Final = 0.35
+"""Of how dark the fibre is: what else is as dark beside it may draw its middle away."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,9 +94,8 @@ class HeldLine:
         part = ahead / self.span_um
         foreseen = pushed_um * part**2 * (1.5 - 0.5 * part)
         half_px = 0.5 * self.width_um / scale
-        offsets_px = np.arange(
-            -SLACK_PX - 2.5 * half_px - 2.0, SLACK_PX + 2.5 * half_px + 2.0, FINE_PX
-        )
+        reach_px = 2.0 * SLACK_PX + half_px + CLEAR_PX
+        offsets_px = np.arange(-reach_px, reach_px, FINE_PX)
         x, y = work.tip_now(work.gripper)
         bows = np.array([self.shape.bow_um(float(each)) for each in ahead])
         middle = y + bows + self.sign * foreseen
@@ -112,7 +119,7 @@ class HeldLine:
             good &= each.dark > LEAST_DARK_PART * typical
         ahead, aside = ahead[good], aside[good]
         std = max(_scatter(aside), LEAST_STD_PX * after.scale_um_px)
-        kept = _smooth(ahead, aside, std)
+        kept = _in_one_piece(ahead, aside, std)
         return BentShape(ahead[kept], aside[kept], std, probe_um, force_un)
 
 
@@ -149,7 +156,11 @@ def _darkest(offsets_px: Floats, greys: Floats, half_px: float) -> tuple[float, 
         if not total > 0.0:
             return np.nan, np.nan
         middle = float(weights @ offsets_px) / total
-    return middle, float(np.interp(middle, offsets_px, smooth))
+    there = float(np.interp(middle, offsets_px, smooth))
+    away = np.abs(offsets_px - middle)
+    beside = smooth[(away > half_px + CLEAR_PX) & (away < half_px + CLEAR_PX + SLACK_PX)]
+    alone = beside.max(initial=0.0) < BESIDE_PART * there
+    return (middle, there) if alone else (np.nan, np.nan)
 
 
 def _scatter(values: Floats) -> float:
@@ -160,15 +171,15 @@ def _scatter(values: Floats) -> float:
     return float(1.4826 * np.median(np.abs(turns)) / np.sqrt(6.0))
 
 
-def _smooth(ahead_um: Floats, aside_um: Floats, std_um: float) -> npt.NDArray[np.bool_]:
-    """Return which values lie near a smooth line through all: others show something else."""
-    if len(ahead_um) < 6:
-        return np.zeros(len(ahead_um), dtype=np.bool_)
-    kept = np.ones(len(ahead_um), dtype=np.bool_)
-    part = ahead_um / ahead_um[-1]
-    for _ in range(2):
-        line = np.polynomial.Polynomial.fit(part[kept], aside_um[kept], 4)
-        kept = np.abs(aside_um - line(part)) < OFF_SIGMAS * max(std_um, 0.3)
-        if kept.sum() < 6:
-            break
-    return kept
+def _in_one_piece(ahead_um: Floats, aside_um: Floats, std_um: float) -> npt.NDArray[np.bool_]:
+    """Return which values are of the longest piece without a jump: beyond is something else."""
+    kept = np.zeros(len(ahead_um), dtype=np.bool_)
+    if len(ahead_um) < LEAST_PLACES:
+        return kept
+    apart, steps = np.diff(ahead_um), np.diff(aside_um)
+    around = np.lib.stride_tricks.sliding_window_view(
+        np.pad(steps / apart, AROUND, mode="reflect"), 2 * AROUND + 1
+    )
+    jumps = np.abs(steps - np.median(around, axis=1) * apart) > OFF_SIGMAS * SQRT_2 * std_um
+    pieces = np.concatenate([[0], np.cumsum(jumps)])
+    return np.asarray(pieces == np.bincount(pieces).argmax())
