@@ -27,6 +27,9 @@ LARGE_PART: Final = 0.015
 SCALE_PART: Final = 0.01
 """How well an image tells micrometres of a platform."""
 DEPTH_STEP_UM: Final = 1.0
+DEPTH_PART: Final = 0.5
+"""Of the depth of the clamp: jaws that turn a little look like a deeper clamp to the spans, and not
+quite so in the image."""
 LEAST_VARIATION: Final = 0.1
 UNLIKELY: Final = 1e-4
 SIGMAS: Final = 4.0
@@ -123,12 +126,13 @@ def fitted_shape(
     deeper, _, _ = _unit(shape, bent.ahead_um, depth_um + DEPTH_STEP_UM)
     by_depth = (deeper - unit) / DEPTH_STEP_UM
     alike = np.exp(-np.abs(middles[:, None] - middles[None, :]) / length_um)
+    deep = max(depth_std_um, DEPTH_PART * depth_um)
     varied = max(variation, LEAST_VARIATION) * pushed_um
     noise = bent.std_um**2 + (LARGE_PART * pushed_um * unit) ** 2
     whole = (
         np.diag(noise)
         + SHIFT_UM**2
-        + (pushed_um * depth_std_um) ** 2 * np.outer(by_depth, by_depth)
+        + (pushed_um * deep) ** 2 * np.outer(by_depth, by_depth)
         + varied**2 * by_cell @ alike @ by_cell.T
     )
     root = np.linalg.inv(whole)

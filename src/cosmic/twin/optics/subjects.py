@@ -10,8 +10,9 @@ from cosmic.twin.felt import Moment, Push
 from cosmic.twin.fibre_state import FibreState
 from cosmic.twin.force_side import ForceSide
 from cosmic.twin.kinematics import Floats, Point, Slide
+from cosmic.twin.optics.bent import Give, bent
 from cosmic.twin.optics.ground import on_plate
-from cosmic.twin.optics.shapes import bridge, cantilever
+from cosmic.twin.optics.shapes import bridge
 from cosmic.twin.optics.solids import read_solids
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.stage import Stage
@@ -165,7 +166,8 @@ class Subjects:
         if len(state.held_by) == 2:
             line, span = self._between(state, line, tips, towards)
         if push is not None:
-            line = self._pushed(line, self._ahead(moment, push, tips, state.anchor, towards), span)
+            ahead = self._ahead(moment, push, tips, state.anchor, towards)
+            line = _pushed(line, ahead, span if state.give is None else state.give)
         line = line * (towards, 1.0, 1.0)
         return Strand(line + start, width)
 
@@ -192,28 +194,38 @@ class Subjects:
         deflection = push.deflection_um + ahead[1][0] - ahead[0][0]
         return push.abscissa_um + ahead[1][1] - ahead[0][1], deflection
 
-    def _pushed(self, line: Floats, push: tuple[float, float], span: float | None) -> Floats:
-        """Return a fibre, first the part in the jaws, as the probe bends it."""
-        along, deflection = push
-        inside, free = line[:1], line[1:]
-        reach = float(free[-1, 0])
-        if not NEAREST_UM < along < (reach if span is None else span - NEAREST_UM):
-            return line
-        if span is None:
-            bent = cantilever(along, deflection, reach)
-        else:
-            bent = np.concatenate([bridge(along, deflection, span), [[max(reach, span), 0.0]]])
-        u = free[:, 0]
-        if len(free) > 2 and (np.diff(u) > 0.0).all():
-            # A bow of its own adds to that of the probe.
-            u = np.unique(np.concatenate([u, bent[:, 0]]))
-            bent = np.column_stack([u, np.interp(u, bent[:, 0], bent[:, 1])])
-        elif len(free) > 2:
-            return line  # it turns back, and the probe hardly gets there
-        found = np.column_stack([bent[:, 0], _at(free, bent[:, 0])])
-        # The probe pushes towards -y.
-        found[:, 1] -= bent[:, 1]
-        return np.concatenate([inside, found])
+
+def _pushed(line: Floats, push: tuple[float, float], held: Give | float | None) -> Floats:
+    """Return a fibre, first the part in the jaws, as the probe bends it.
+
+    Parameters
+    ----------
+    held : Give or float or None
+        By one gripper, or how far two are apart.
+    """
+    along, deflection = push
+    inside, free = line[:1], line[1:]
+    reach = float(free[-1, 0])
+    if isinstance(held, float):
+        return _bridged(line, push, held)
+    rises = bool((np.diff(free[:, 0]) > 0.0).all())
+    if held is None or not (rises and NEAREST_UM < along < reach):
+        return line  # where it turns back the probe hardly gets there
+    plane = bent(free[:, :2], held, along, deflection)
+    return np.concatenate([inside, np.column_stack([plane, _at(free, plane[:, 0])[:, 1]])])
+
+
+def _bridged(line: Floats, push: tuple[float, float], span: float) -> Floats:
+    along, deflection = push
+    inside, free = line[:1], line[1:]
+    reach = float(free[-1, 0])
+    if not NEAREST_UM < along < span - NEAREST_UM:
+        return line
+    shape = np.concatenate([bridge(along, deflection, span), [[max(reach, span), 0.0]]])
+    found = np.column_stack([shape[:, 0], _at(free, shape[:, 0])])
+    # The probe pushes towards -y.
+    found[:, 1] -= shape[:, 1]
+    return np.concatenate([inside, found])
 
 
 def _pose_key(state: FibreState) -> tuple[float, ...]:
