@@ -84,6 +84,11 @@ def test_a_fibre_is_found_taken_up_bent_and_put_away(tmp_path: Path):
         assert not bench.work.failures
         assert {"geometry", "held"} <= set(fibre.images)
         assert len(fibre.spans) == SETTINGS.push.spans.count
+    first, *others = (each.bent for each in fibre.spans)
+    assert first is not None, "the longest push was looked at"
+    assert len(first.ahead_um) > 15
+    assert first.aside_um[-1] > 10.0 * first.std_um
+    assert others == [None] * len(others)
     record = read_truth(truth)
     check(record, fibre)
     assert unintended(record) == set()

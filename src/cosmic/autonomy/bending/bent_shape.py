@@ -18,10 +18,12 @@ from cosmic.autonomy.bending.result import Floats
 
 CELLS: Final = 160
 LEAST_PLACES: Final = 8
+LEAST_SHOWN: Final = 0.4
+"""Of how far the fibre is bent at the probe: what shows less than that tells nothing of it there."""
 LEAST_BENT_TIMES: Final = 12.0
 """Of the scatter of one place: what is bent less shows no shape."""
 SHIFT_UM: Final = 1.5
-"""How far a picture may be shifted against an earlier one: stages creep, and the air trembles."""
+"""How far an image may be shifted against an earlier one: stages creep, and the air trembles."""
 LARGE_PART: Final = 0.015
 """Of how far it is bent: what a large push makes of the shape of a small one."""
 SCALE_PART: Final = 0.01
@@ -123,6 +125,8 @@ def fitted_shape(
     if len(bent.ahead_um) < LEAST_PLACES or not pushed_um > LEAST_BENT_TIMES * bent.std_um:
         return None
     unit, by_cell, middles = _unit(shape, bent.ahead_um, depth_um)
+    if unit.max() < LEAST_SHOWN:
+        return None
     deeper, _, _ = _unit(shape, bent.ahead_um, depth_um + DEPTH_STEP_UM)
     by_depth = (deeper - unit) / DEPTH_STEP_UM
     alike = np.exp(-np.abs(middles[:, None] - middles[None, :]) / length_um)

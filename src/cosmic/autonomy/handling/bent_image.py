@@ -117,6 +117,9 @@ class HeldLine:
         for each in (before, after):
             typical = float(np.median(each.dark[good])) if good.any() else np.inf
             good &= each.dark > LEAST_DARK_PART * typical
+        # What lies below is as dark in both images, and no other place of the fibre is.
+        times = after.dark / np.maximum(before.dark, 1e-9)
+        good &= (times > LEAST_DARK_PART) & (times < 1.0 / LEAST_DARK_PART)
         ahead, aside = ahead[good], aside[good]
         std = max(_scatter(aside), LEAST_STD_PX * after.scale_um_px)
         kept = _in_one_piece(ahead, aside, std)

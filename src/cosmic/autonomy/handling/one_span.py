@@ -111,7 +111,9 @@ class OneSpan:
         self._shape = shape_of(work, fibre)
         self._slope = self._shape.slope_at(plan.span_um)
         self._first = fibre.zero_un is None
-        self._longest = not (fibre.spans or fibre.standard)
+        # Where the camera has shown it in the jaws; a standard is too thin for its pixels.
+        shown = "held" in fibre.images and not fibre.standard
+        self._witnessed = self._push.witness and shown and not fibre.spans
         # The probe pushes along its own direction; way grows as it does.
         self._sign = 1.0 if work.probe.forward[1] > 0.0 else -1.0
 
@@ -126,7 +128,7 @@ class OneSpan:
         try:
             yield from self._go_in_front()
             base = yield from self._baseline()
-            if self._push.witness and self._longest:
+            if self._witnessed:
                 self._unpushed = yield from self._look(0.0)
             contact = yield from self._search(base)
             if self._first and self._push.rest_s > 0.0:

@@ -51,7 +51,7 @@ def test_a_beam_as_the_textbook_bends_it_agrees_and_is_bent_as_far_as_it_was_pus
         assert found.bent_std_um < 3.0
 
 
-def test_a_picture_that_is_shifted_a_little_or_a_clamp_elsewhere_speaks_against_nothing() -> None:
+def test_an_image_that_is_shifted_a_little_or_a_clamp_elsewhere_speaks_against_nothing() -> None:
     assert not require(fit(seen(uniform, shift_um=1.5))).problem
     assert not require(fit(seen(lambda x: uniform(x, depth_um=38.0)))).problem
 
@@ -124,8 +124,13 @@ def test_a_curled_fibre_bends_by_the_arms_it_has() -> None:
     assert found.bent_um == pytest.approx(PUSHED_UM, rel=0.05)
 
 
-def test_what_is_hardly_bent_or_seen_at_few_places_shows_nothing() -> None:
+def test_what_is_hardly_bent_or_seen_at_few_places_or_near_the_jaws_alone_shows_nothing() -> None:
     assert fit(seen(uniform), pushed_um=5.0) is None
     few = seen(uniform)
     few = BentShape(few.ahead_um[:5], few.aside_um[:5], NOISE_UM, 100.0, 30.0)
     assert fit(few) is None
+    near = seen(uniform)
+    here = near.ahead_um < 250.0
+    near = BentShape(near.ahead_um[here], near.aside_um[here], NOISE_UM, 100.0, 30.0)
+    assert len(near.ahead_um) > 8
+    assert fit(near) is None

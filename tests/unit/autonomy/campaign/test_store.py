@@ -15,6 +15,7 @@ from threading import Event
 import numpy as np
 import pytest
 
+from cosmic.autonomy.bending.bent_shape import BentShape
 from cosmic.autonomy.bending.span import Freed
 from cosmic.autonomy.campaign.analysis import altered_files
 from cosmic.autonomy.campaign.recorder import Journal
@@ -50,6 +51,19 @@ def test_what_a_slide_has_shown_is_kept_with_its_span(store: CampaignStore) -> N
     np.testing.assert_array_equal(read.freed.up_un, slid.up_un)
     np.testing.assert_array_equal(read.freed.down_un, slid.down_un)
     assert all(each.freed is None for each in rest)
+
+
+def test_what_an_image_has_shown_of_a_push_is_kept_with_its_span(store: CampaignStore) -> None:
+    record = good(store.begin_fibre(Pose(0.0, 0.0, 0.0), time_s=5.0), began_s=5.0)
+    seen = BentShape(np.array([70.0, 85.0]), np.array([0.4, 0.9]), 0.6, 120.5, 31.0)
+    first, *others = record.spans
+    store.finish_fibre(replace(record, spans=(replace(first, bent=seen), *others)))
+    read, *rest = CampaignReader(store.folder).fibre(record.number).spans
+    assert read.bent is not None
+    assert (read.bent.std_um, read.bent.probe_um, read.bent.force_un) == (0.6, 120.5, 31.0)
+    np.testing.assert_array_equal(read.bent.ahead_um, seen.ahead_um)
+    np.testing.assert_array_equal(read.bent.aside_um, seen.aside_um)
+    assert all(each.bent is None for each in rest)
 
 
 def test_what_is_written_is_read_back_whole(store: CampaignStore) -> None:
