@@ -19,7 +19,7 @@ from cosmic.autonomy.bending.result import Floats
 CELLS: Final = 160
 LEAST_PLACES: Final = 8
 LEAST_SHOWN: Final = 0.4
-"""Of how far the fibre is bent at the probe: what shows less than that tells nothing of it there."""
+"""Of how far the fibre is bent at the probe: less than that tells nothing of what it is there."""
 LEAST_BENT_TIMES: Final = 12.0
 """Of the scatter of one place: what is bent less shows no shape."""
 SHIFT_UM: Final = 1.5
