@@ -110,7 +110,12 @@ class HeldLine:
     def bent(
         self, before: FibreSeen, after: FibreSeen, *, probe_um: float, force_un: float
     ) -> BentShape:
-        """Return how far it was bent between two images, where both show it."""
+        """Return how far it was bent between two images, where both show it.
+
+        Nowhere, where they were taken at different magnifications.
+        """
+        if before.scale_um_px != after.scale_um_px:
+            return BentShape(np.empty(0), np.empty(0), np.inf, probe_um, force_un)
         ahead = self.places_um(after.scale_um_px)
         aside = after.aside_um - before.aside_um
         good = np.isfinite(aside) & np.isfinite(before.dark) & np.isfinite(after.dark)

@@ -116,6 +116,7 @@ class OneSpan:
         self._witnessed = self._push.witness and shown and not fibre.spans
         # The probe pushes along its own direction; way grows as it does.
         self._sign = 1.0 if work.probe.forward[1] > 0.0 else -1.0
+        self._line = HeldLine(work, self._shape, plan.span_um, fibre.width_um, self._sign)
 
     def steps(self) -> Steps:
         """Find the fibre, push it, let it go, and keep the span.
@@ -408,14 +409,15 @@ class OneSpan:
 
     def _look(self, pushed_um: float) -> Generator[Yielded, object, FibreSeen | None]:
         """Return where an image shows the fibre; None where there is none to be had."""
-        work, fibre = self._work, self._fibre
-        line = HeldLine(work, self._shape, self._plan.span_um, fibre.width_um, self._sign)
+        work = self._work
         try:
+            if work.vico.camera(work.settings.camera).problem:
+                return None  # nobody waits for a witness while the fibre is bent
             image = yield work.image()
             assert isinstance(image, CameraImage)
-            return line.seen(image, pushed_um)
+            return self._line.seen(image, pushed_um)
         except (NotAvailable, DeviceError) as exc:
-            logger.warning("fibre %d: its bent shape is not looked at: %s", fibre.number, exc)
+            logger.warning("the bent shape is not looked at: %s", exc)
             return None
 
     def _see_bent(self, base_un: float, contact_um: float) -> Steps:
@@ -426,9 +428,9 @@ class OneSpan:
         probe_um, force_un = points.probe_um[-1], points.force_un[-1] - base_un
         after = yield from self._look(probe_um - self._met_um(contact_um))
         if after is not None:
-            fibre, span_um = self._fibre, self._plan.span_um
-            line = HeldLine(self._work, self._shape, span_um, fibre.width_um, self._sign)
-            self._bent = line.bent(self._unpushed, after, probe_um=probe_um, force_un=force_un)
+            self._bent = self._line.bent(
+                self._unpushed, after, probe_um=probe_um, force_un=force_un
+            )
 
     def _back(self, contact_um: float) -> Steps:
         push = self._push
