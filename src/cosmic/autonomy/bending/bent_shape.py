@@ -7,6 +7,7 @@ meets something besides the probe, bends otherwise.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -29,12 +30,11 @@ LARGE_PART: Final = 0.015
 SCALE_PART: Final = 0.01
 """How well an image tells micrometres of a platform."""
 DEPTH_STEP_UM: Final = 1.0
-DEPTH_PART: Final = 0.5
-"""Of the depth of the clamp: jaws that turn a little look like a deeper clamp to the spans, and not
-quite so in the image."""
 LEAST_VARIATION: Final = 0.1
 UNLIKELY: Final = 1e-4
 SIGMAS: Final = 4.0
+LEAST_FIBRES: Final = 4
+TURNED_SIGMAS: Final = 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,6 +73,9 @@ class ShapeFit:
         The same by the axis and the force.
     chi2, freedom : float, int
         Of the shape.
+    turned_part, turned_std_part : float
+        Part of its way that the fibre goes as if it only turned about the jaws' tip, beyond what
+        the clamp's depth makes of it.
     """
 
     bent_um: float
@@ -81,6 +84,8 @@ class ShapeFit:
     pushed_std_um: float
     chi2: float
     freedom: int
+    turned_part: float
+    turned_std_part: float
 
     @property
     def problem(self) -> str:
@@ -130,19 +135,21 @@ def fitted_shape(
     deeper, _, _ = _unit(shape, bent.ahead_um, depth_um + DEPTH_STEP_UM)
     by_depth = (deeper - unit) / DEPTH_STEP_UM
     alike = np.exp(-np.abs(middles[:, None] - middles[None, :]) / length_um)
-    deep = max(depth_std_um, DEPTH_PART * depth_um)
     varied = max(variation, LEAST_VARIATION) * pushed_um
     noise = bent.std_um**2 + (LARGE_PART * pushed_um * unit) ** 2
     whole = (
         np.diag(noise)
         + SHIFT_UM**2
-        + (pushed_um * deep) ** 2 * np.outer(by_depth, by_depth)
+        + (pushed_um * depth_std_um) ** 2 * np.outer(by_depth, by_depth)
         + varied**2 * by_cell @ alike @ by_cell.T
     )
     root = np.linalg.inv(whole)
     information = float(unit @ root @ unit)
     found = float(unit @ root @ bent.aside_um) / information
     left = bent.aside_um - found * unit
+    turned, std = _turned_um(
+        bent, shape, unit, pushed_um, whole + pushed_std_um**2 * np.outer(unit, unit)
+    )
     return ShapeFit(
         bent_um=found,
         bent_std_um=math.hypot(information**-0.5, SCALE_PART * found),
@@ -150,7 +157,39 @@ def fitted_shape(
         pushed_std_um=pushed_std_um,
         chi2=float(left @ root @ left),
         freedom=len(left) - 1,
+        turned_part=turned / pushed_um,
+        turned_std_part=std / pushed_um,
     )
+
+
+def turned_in_jaws(fits: Sequence[ShapeFit]) -> str:
+    """Return what images of several fibres say of the jaws; empty where those hold them firmly.
+
+    One fibre may be soft where it leaves the jaws. Where all seem to be, the jaws turn, or the
+    depths of the clamp are wrong together: spans cannot tell one from the other.
+    """
+    if len(fits) < LEAST_FIBRES:
+        return ""
+    weights = np.array([each.turned_std_part**-2.0 for each in fits])
+    part = float(weights @ [each.turned_part for each in fits] / weights.sum())
+    std = float(weights.sum() ** -0.5)
+    if not part > TURNED_SIGMAS * std:
+        return ""
+    return (
+        f"images of {len(fits)} fibres show them turn in the jaws where the model has them bend: "
+        f"{100.0 * part:.0f} +/- {100.0 * std:.0f} % of the way of the probe"
+    )
+
+
+def _turned_um(
+    bent: BentShape, shape: NaturalShape, unit: Floats, pushed_um: float, whole: Floats
+) -> tuple[float, float]:
+    """Return how far the probe has only turned the fibre, instead of bending it, and the error."""
+    more = bent.ahead_um / shape.at_um - unit
+    root = np.linalg.inv(whole)
+    information = float(more @ root @ more)
+    turned = float(more @ root @ (bent.aside_um - pushed_um * unit)) / information
+    return turned, information**-0.5
 
 
 def _unit(shape: NaturalShape, ahead_um: Floats, depth_um: float) -> tuple[Floats, Floats, Floats]:

@@ -74,6 +74,7 @@ def checked(
     settings: FitSettings,
     *,
     seen: Mapping[int, ShapeFit],
+    jaws: str,
 ) -> BendingResult:
     """Return the result with its flags, whether it is trusted, and why not.
 
@@ -81,6 +82,8 @@ def checked(
     ----------
     seen : mapping of int to ShapeFit
         What images say of spans, by their number.
+    jaws : str
+        What images of all fibres say against the jaws; empty where they hold.
     """
     flags: set[Quality] = set()
     reasons = [
@@ -115,6 +118,9 @@ def checked(
         if shape.problem:
             flags.add(Quality.SHAPE)
             reasons.append(f"span {number + 1}: {shape.problem}")
+    if jaws:
+        flags.add(Quality.SHAPE)
+        reasons.append(jaws)
     used = [result.spans[n] for n in result.used]
     cause = _cause(used, readings, assessed, settings)
     if cause is not None:

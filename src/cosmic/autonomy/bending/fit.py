@@ -1,13 +1,13 @@
 """Bending stiffness of a fibre from several spans of one grasp, and how far it may be believed."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from cosmic.autonomy.bending.bent_shape import ShapeFit, fitted_shape
+from cosmic.autonomy.bending.bent_shape import ShapeFit, fitted_shape, turned_in_jaws
 from cosmic.autonomy.bending.budget import budget_of
 from cosmic.autonomy.bending.checks import checked
 from cosmic.autonomy.bending.curved import NaturalShape
@@ -350,11 +350,19 @@ def assess_campaign(
     else:
         rubs = settings.friction
     each_assessed = iter(assessed.fibres if assessed else ())
+    pairs = [
+        (each, None if each.readings is None else next(each_assessed))
+        for each in every[: len(fibres)]
+    ]
+    seen = [{} if one is None else _seen_bent(each, one.posterior) for each, one in pairs]
+    jaws = turned_in_jaws([shape for shapes in seen for shape in shapes.values()])
     results = tuple(
         _nothing(each, settings)
-        if each.readings is None
-        else _concluded(each, each.readings, next(each_assessed), settings, verified=verified)
-        for each in every[: len(fibres)]
+        if each.readings is None or one is None
+        else _concluded(
+            each, each.readings, one, settings, verified=verified, seen=shapes, jaws=jaws
+        )
+        for (each, one), shapes in zip(pairs, seen, strict=True)
     )
     common = assessed.common if assessed else common_prior(settings)
     return CampaignFit(results, alone, scale_of(common, found, verified=verified), rubs)
@@ -415,6 +423,8 @@ def _concluded(
     settings: FitSettings,
     *,
     verified: bool,
+    seen: Mapping[int, ShapeFit] | None = None,
+    jaws: str = "",
 ) -> BendingResult:
     posterior, scale = assessed.posterior, N_M2_PER_UN_UM2
     if not -FARTHEST_LN < posterior.log_low <= posterior.log_high < FARTHEST_LN:
@@ -436,7 +446,7 @@ def _concluded(
         budget=budget_of(readings, assessed.common, settings, posterior, assessed.evidence),
         scale_verified=verified,
     )
-    return checked(result, readings, assessed, settings, seen=_seen_bent(fibre, posterior))
+    return checked(result, readings, assessed, settings, seen=seen or {}, jaws=jaws)
 
 
 def _seen_bent(fibre: MeasuredFibre, posterior: Posterior) -> dict[int, ShapeFit]:

@@ -7,7 +7,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from cosmic.autonomy.bending.bent_shape import BentShape, ShapeFit, fitted_shape
+from cosmic.autonomy.bending.bent_shape import (
+    BentShape,
+    ShapeFit,
+    fitted_shape,
+    turned_in_jaws,
+)
 from cosmic.autonomy.bending.curved import NaturalShape
 
 Floats = npt.NDArray[np.float64]
@@ -80,6 +85,17 @@ def test_a_fibre_whose_stiffness_varies_by_a_sixth_agrees() -> None:
 def test_what_turns_in_the_jaws_instead_of_bending_does_not_agree() -> None:
     turned = require(fit(seen(lambda x: PUSHED_UM * x / SPAN_UM)))
     assert "otherwise than one beam" in turned.problem
+
+
+def test_what_one_fibre_may_do_by_a_soft_place_all_of_them_do_in_jaws_that_turn() -> None:
+    def turning(x_um: Floats) -> Floats:
+        return 0.75 * uniform(x_um) + 0.25 * PUSHED_UM * x_um / SPAN_UM
+
+    several = [require(fit(seen(turning, seed=seed))) for seed in range(16)]
+    assert not any(each.problem for each in several)
+    assert "16 fibres show them turn in the jaws" in turned_in_jaws(several)
+    assert turned_in_jaws(several[:3]) == ""
+    assert turned_in_jaws([require(fit(seen(uniform, seed=seed))) for seed in range(40)]) == ""
 
 
 def test_a_weak_place_does_not_agree() -> None:
