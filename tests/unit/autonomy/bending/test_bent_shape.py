@@ -56,7 +56,7 @@ def test_a_beam_as_the_textbook_bends_it_agrees_and_is_bent_as_far_as_it_was_pus
         assert found.bent_std_um < 3.0
 
 
-def test_an_image_that_is_shifted_a_little_or_a_clamp_elsewhere_speaks_against_nothing() -> None:
+def test_an_image_that_is_shifted_a_little_or_a_deeper_clamp_speaks_against_nothing() -> None:
     assert not require(fit(seen(uniform, shift_um=3.0))).problem
     assert not require(fit(seen(lambda x: uniform(x, depth_um=60.0)))).problem
 

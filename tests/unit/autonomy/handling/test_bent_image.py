@@ -90,7 +90,7 @@ def test_how_far_each_place_went_is_seen_to_a_tenth_of_a_pixel() -> None:
     assert found.std_um == pytest.approx(0.6, abs=0.3)
 
 
-def test_a_fibre_that_lies_elsewhere_than_it_was_foreseen_is_found_all_the_same() -> None:
+def test_a_fibre_that_lies_beside_where_it_was_foreseen_is_found_all_the_same() -> None:
     x = columns_um()
     more = drawn(12.0 + 1.2 * uniform(np.maximum(x, 0.0)), seed=3)
     found = bent(drawn(12.0, seed=4), more)
