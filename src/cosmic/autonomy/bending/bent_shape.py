@@ -162,6 +162,19 @@ def fitted_shape(
     )
 
 
+def bent_um(shape: NaturalShape, ahead_um: Floats, *, pushed_um: float, depth_um: float) -> Floats:
+    """Return how far places ahead of the jaws go aside in one even beam, shape (n,).
+
+    Parameters
+    ----------
+    pushed_um : float
+        How far the fibre gave way at the probe.
+    depth_um : float
+        How deep in the jaws it is clamped.
+    """
+    return pushed_um * _unit(shape, ahead_um, depth_um)[0]
+
+
 def turned_in_jaws(fits: Sequence[ShapeFit]) -> str:
     """Return what images of several fibres say of the jaws; empty where those hold them firmly.
 

@@ -58,6 +58,7 @@ from cosmic.autonomy.campaign.report_figures import (
     operation_bars,
     operation_times,
     residual_figure,
+    shape_figure,
     stiffness_figure,
 )
 from cosmic.autonomy.campaign.selection import Selection, selection_of
@@ -507,7 +508,12 @@ def _cards(data: ReportData, svg: ShowSvg, png: ShowPng) -> Iterator[_Card]:
     for each in (*data.finished, *data.standards):
         record = data.whole(each.number)
         figures = [_shown(image, png) for image in record.images[:2]]
-        drawn = force_figure(record), stiffness_figure(record), residual_figure(record)
+        drawn = (
+            force_figure(record),
+            stiffness_figure(record),
+            residual_figure(record),
+            shape_figure(record),
+        )
         figures += [Markup(svg(figure, 430)) for figure in drawn if figure]
         rows = [] if record.bending is None else _span_rows(record.bending)
         # Of a standard the stiffness is known, and the scale is what is measured.

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.autonomy.bending.bent_shape import bent_um
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.campaign.formatting import EI_LABEL, EI_UNIT
 from cosmic.autonomy.campaign.records import FibreRecord
@@ -143,6 +144,35 @@ def residual_figure(record: FibreRecord) -> str:
                 hollow=colour == ORANGE,
             )
     return plot.svg()
+
+
+def shape_figure(record: FibreRecord) -> str:
+    """Return how far an image shows a fibre bent at the end of its longest push, and the model.
+
+    The model is an even beam that is clamped as the spans say and bent as far as the probe went.
+    """
+    result = record.bending
+    pairs = zip(record.spans, result.spans, strict=False) if result is not None else ()
+    for span, fit in pairs:
+        bent, shape = span.bent, span.shape
+        if result is None or bent is None or shape is None or not len(bent.ahead_um):
+            continue
+        pushed = bent.probe_um - fit.hinge_um
+        if not pushed > 0.0:
+            return ""
+        places = np.linspace(1.0, shape.at_um, 40)
+        model = bent_um(shape, places, pushed_um=pushed, depth_um=result.clamp_offset_um)
+        aside = bent.aside_um
+        low, high = min(0.0, float(aside.min())), max(pushed, float(aside.max()))
+        x = Axis("place from the tip of the jaws, µm", *around(0.0, shape.at_um))
+        y = Axis("pushed aside, µm", *around(low, high))
+        plot = Plot(x, y, f"Bent shape of fibre {record.number} in the image", height=220.0)
+        plot.line(places.tolist(), model.tolist(), GREY)
+        plot.points(bent.ahead_um.tolist(), aside.tolist(), BLUE)
+        plot.points([shape.at_um], [pushed], ORANGE)
+        plot.note(shape.at_um, pushed, "probe", end=True)
+        return plot.svg()
+    return ""
 
 
 def stiffness_figure(record: FibreRecord) -> str:

@@ -7,10 +7,13 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from cosmic.app.cli import main
+from cosmic.autonomy.bending.bent_shape import BentShape
+from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.bending.result import Contribution, Kind
 from cosmic.autonomy.campaign.formatting import budget_rows, length_words, with_interval
 from cosmic.autonomy.campaign.records import (
@@ -21,7 +24,7 @@ from cosmic.autonomy.campaign.records import (
     Shape,
 )
 from cosmic.autonomy.campaign.report import write_report
-from cosmic.autonomy.campaign.report_figures import force_figure, stiffness_figure
+from cosmic.autonomy.campaign.report_figures import force_figure, shape_figure, stiffness_figure
 from cosmic.autonomy.campaign.report_table import COLUMNS, read_campaign, write_table
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
@@ -294,12 +297,13 @@ def test_spans_that_are_not_those_of_the_result_cost_no_report(tmp_path: Path) -
     assert "Fibre 1" in (tmp_path / "run" / "report.html").read_text("utf-8")
 
 
-def test_the_spans_are_drawn_as_they_were_read_and_as_the_fit_has_them() -> None:
-    def circles(svg: str) -> list[bool]:
-        """Return of each circle whether it is filled."""
-        found = ET.fromstring(svg).iter("{http://www.w3.org/2000/svg}circle")
-        return [each.get("fill") != "none" for each in found]
+def circles(svg: str) -> list[bool]:
+    """Return of each circle whether it is filled."""
+    found = ET.fromstring(svg).iter("{http://www.w3.org/2000/svg}circle")
+    return [each.get("fill") != "none" for each in found]
 
+
+def test_the_spans_are_drawn_as_they_were_read_and_as_the_fit_has_them() -> None:
     record = good(1)
     assert record.bending is not None
     spans, used = record.bending.spans, len(record.bending.used)
@@ -307,6 +311,22 @@ def test_the_spans_are_drawn_as_they_were_read_and_as_the_fit_has_them() -> None
     older = tuple(replace(each, off_model_log=math.nan) for each in spans)
     kept = replace(record, bending=replace(record.bending, spans=older))
     assert circles(stiffness_figure(kept)) == [False] * len(spans)
+
+
+def test_the_bent_shape_is_drawn_where_an_image_was_taken() -> None:
+    record = good(3)
+    assert record.bending is not None
+    assert shape_figure(record) == ""
+    span, fit = record.spans[0], record.bending.spans[0]
+    ahead = np.linspace(0.0, 900.0, 91)
+    seen = BentShape(
+        np.array([70.0, 200.0, 400.0]), np.array([0.5, 4.0, 15.0]), 0.6, fit.hinge_um + 40.0, 20.0
+    )
+    looked = replace(span, bent=seen, shape=NaturalShape(ahead, np.zeros(91), 600.0))
+    drawn = shape_figure(replace(record, spans=(looked, *record.spans[1:])))
+    assert "Bent shape of fibre 3 in the image" in drawn
+    assert circles(drawn) == [True] * 4
+    assert ">probe<" in drawn
 
 
 @pytest.mark.parametrize(
