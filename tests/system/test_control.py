@@ -194,7 +194,8 @@ def test_however_it_ends_the_axis_stands(
     wait_until(lambda: lazy.truth_um() < start_um - 2.0, 10.0)
     try:
         end(lazy, loop)
-        WALL.sleep(0.1)
+        # Silence is one once it has lasted, and until then the loop goes on.
+        WALL.sleep(0.1 if end is not by_silence else 0.4)
         then_um = lazy.truth_um()
         assert loop.wait(5.0) == WAYS[end]
         WALL.sleep(0.1)
