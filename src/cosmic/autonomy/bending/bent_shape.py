@@ -34,7 +34,6 @@ LEAST_VARIATION: Final = 0.1
 UNLIKELY: Final = 1e-4
 SIGMAS: Final = 4.0
 LEAST_FIBRES: Final = 4
-TURNED_SIGMAS: Final = 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,7 +185,7 @@ def turned_in_jaws(fits: Sequence[ShapeFit]) -> str:
     weights = np.array([each.turned_std_part**-2.0 for each in fits])
     part = float(weights @ [each.turned_part for each in fits] / weights.sum())
     std = float(weights.sum() ** -0.5)
-    if not part > TURNED_SIGMAS * std:
+    if not part > SIGMAS * std:
         return ""
     return (
         f"images of {len(fits)} fibres show them turn in the jaws where the model has them bend: "

@@ -6,13 +6,12 @@ with follows from noise, stroke and stiffness.
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from cosmic.autonomy.bending.bent_shape import ShapeFit
 from cosmic.autonomy.bending.inference import (
     UNLIKELY,
     VARIATIONS,
@@ -73,35 +72,16 @@ def checked(
     assessed: Assessed,
     settings: FitSettings,
     *,
-    seen: Mapping[int, ShapeFit],
-    jaws: str,
+    by_images: Sequence[str] = (),
 ) -> BendingResult:
     """Return the result with its flags, whether it is trusted, and why not.
 
     Parameters
     ----------
-    seen : mapping of int to ShapeFit
-        What images say of spans, by their number.
-    jaws : str
-        What images of all fibres say against the jaws; empty where they hold.
+    by_images : sequence of str
+        What images of bent fibres say against it.
     """
-    flags: set[Quality] = set()
-    reasons = [
-        f"span {number + 1} at {fit.place_um:.0f} um: {', '.join(sorted(spoilt))}"
-        for number, fit in enumerate(result.spans)
-        if (spoilt := fit.flags & set(BAD))
-    ]
-    good = [n for n in result.used if not result.spans[n].flags & set(BAD)]
-    if len(good) < LEAST_SPANS:
-        flags.add(Quality.TOO_FEW_SPANS)
-        reasons.append(f"{len(good)} good spans, and {LEAST_SPANS} are needed to find the clamp")
-        flags |= {flag for fit in result.spans for flag in fit.flags & set(BAD)}
-    elif not _apart_um(result, good) > SIGMAS * settings.contact_std_um:
-        flags.add(Quality.TOO_FEW_SPANS)
-        reasons.append(
-            f"all good spans lie at {result.spans[good[0]].place_um:.0f} um, and two places are "
-            "needed to find the clamp"
-        )
+    flags, reasons = _spoilt_spans(result, settings)
     half = 50.0 * (result.ei_high_n_m2 - result.ei_low_n_m2) / result.ei_n_m2
     if not half <= settings.soft_percent:
         flags.add(Quality.TOO_SOFT)
@@ -114,13 +94,9 @@ def checked(
             "the interval ends where depths are not weighed any more: something else may make "
             "short spans soft"
         )
-    for number, shape in seen.items():
-        if shape.problem:
-            flags.add(Quality.SHAPE)
-            reasons.append(f"span {number + 1}: {shape.problem}")
-    if jaws:
+    if by_images:
         flags.add(Quality.SHAPE)
-        reasons.append(jaws)
+        reasons += by_images
     used = [result.spans[n] for n in result.used]
     cause = _cause(used, readings, assessed, settings)
     if cause is not None:
@@ -139,6 +115,28 @@ def checked(
         reasons=tuple(reasons),
         notes=frozenset(notes - flags),
     )
+
+
+def _spoilt_spans(result: BendingResult, settings: FitSettings) -> tuple[set[Quality], list[str]]:
+    """Return what is wrong with single spans, and whether enough are left to find the clamp."""
+    flags: set[Quality] = set()
+    reasons = [
+        f"span {number + 1} at {fit.place_um:.0f} um: {', '.join(sorted(spoilt))}"
+        for number, fit in enumerate(result.spans)
+        if (spoilt := fit.flags & set(BAD))
+    ]
+    good = [n for n in result.used if not result.spans[n].flags & set(BAD)]
+    if len(good) < LEAST_SPANS:
+        flags.add(Quality.TOO_FEW_SPANS)
+        reasons.append(f"{len(good)} good spans, and {LEAST_SPANS} are needed to find the clamp")
+        flags |= {flag for fit in result.spans for flag in fit.flags & set(BAD)}
+    elif not _apart_um(result, good) > SIGMAS * settings.contact_std_um:
+        flags.add(Quality.TOO_FEW_SPANS)
+        reasons.append(
+            f"all good spans lie at {result.spans[good[0]].place_um:.0f} um, and two places are "
+            "needed to find the clamp"
+        )
+    return flags, reasons
 
 
 def _deeper(assessed: Assessed, depth_um: float) -> float:

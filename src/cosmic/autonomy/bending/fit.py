@@ -360,7 +360,12 @@ def assess_campaign(
         _nothing(each, settings)
         if each.readings is None or one is None
         else _concluded(
-            each, each.readings, one, settings, verified=verified, seen=shapes, jaws=jaws
+            each,
+            each.readings,
+            one,
+            settings,
+            verified=verified,
+            by_images=[*_problems(shapes), *filter(None, [jaws])],
         )
         for (each, one), shapes in zip(pairs, seen, strict=True)
     )
@@ -423,8 +428,7 @@ def _concluded(
     settings: FitSettings,
     *,
     verified: bool,
-    seen: Mapping[int, ShapeFit] | None = None,
-    jaws: str = "",
+    by_images: Sequence[str] = (),
 ) -> BendingResult:
     posterior, scale = assessed.posterior, N_M2_PER_UN_UM2
     if not -FARTHEST_LN < posterior.log_low <= posterior.log_high < FARTHEST_LN:
@@ -446,7 +450,12 @@ def _concluded(
         budget=budget_of(readings, assessed.common, settings, posterior, assessed.evidence),
         scale_verified=verified,
     )
-    return checked(result, readings, assessed, settings, seen=seen or {}, jaws=jaws)
+    return checked(result, readings, assessed, settings, by_images=by_images)
+
+
+def _problems(seen: Mapping[int, ShapeFit]) -> list[str]:
+    """Return what images say against single spans."""
+    return [f"span {n + 1}: {each.problem}" for n, each in seen.items() if each.problem]
 
 
 def _seen_bent(fibre: MeasuredFibre, posterior: Posterior) -> dict[int, ShapeFit]:
