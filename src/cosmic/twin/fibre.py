@@ -20,7 +20,7 @@ from cosmic.twin.handling_settings import HandlingSettings
 from cosmic.twin.inelastic import Inelastic, crept_part
 from cosmic.twin.kinematics import Point
 from cosmic.twin.measurand import compliance_weights
-from cosmic.twin.optics.bent import Give
+from cosmic.twin.optics.bent import Compliance
 from cosmic.twin.rod import (
     EI_UN_UM2_PER_N_M2,
     UN_PER_N,
@@ -64,7 +64,7 @@ MEASURED_AFTER_S: Final = 1.0
 """After a step: what a bending test is about changes with time."""
 
 MOST_CREEP: Final = 0.3
-GIVE_PLACES: Final = 120
+COMPLIANCE_PLACES: Final = 120
 COMPARED_PART: Final = 0.05
 """Of the length to the probe: a push by which it is told which way the fibre is rubbed."""
 
@@ -190,7 +190,7 @@ class Fibre:
         self._curves: _Curves | None = None
         self._inelastic: Inelastic | None = None
         self._clamped: tuple[tuple[float, float], float] | None = None
-        self._gives: tuple[tuple[float, float, float], Give] | None = None
+        self._compliance: tuple[tuple[float, float, float], Compliance] | None = None
         energy = handling.adhesion_un * math.exp(
             handling.adhesion_sigma_ln * random.Random(f"adhesion {self.key}").gauss(0.0, 1.0)
         )
@@ -324,21 +324,21 @@ class Fibre:
         return self._section.seen_um(hold.at_um, hold.fate.roll_rad)
 
     @property
-    def give(self) -> Give | None:
+    def compliance(self) -> Compliance | None:
         """How it gives way to the probe from its clamp on, where one gripper holds it."""
         if len(self.holds) != 1:
             return None
         (hold,) = self.holds.values()
         key = hold.at_um, hold.fate.roll_rad, hold.depth_um
-        if self._gives is None or self._gives[0] != key:
-            places = np.linspace(0.0, hold.free.length_um, GIVE_PLACES)
+        if self._compliance is None or self._compliance[0] != key:
+            places = np.linspace(0.0, hold.free.length_um, COMPLIANCE_PLACES)
             across, _, _ = self._section.flexibility(
                 hold.at_um + hold.outwards * places, hold.fate.roll_rad
             )
             turn = math.radians(self._contact.jaw_turn_deg) * 1e-3
             turn_um = turn * self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2 / float(across[0])
-            self._gives = key, Give(hold.depth_um, turn_um, places, across)
-        return self._gives[1]
+            self._compliance = key, Compliance(hold.depth_um, turn_um, places, across)
+        return self._compliance[1]
 
     def strain(self, abscissa_um: float, force_un: float) -> float:
         """Return the strain at the clamp under a force there."""

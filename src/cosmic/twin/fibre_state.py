@@ -10,7 +10,7 @@ from cosmic.twin.centre_line import CentreLine
 from cosmic.twin.fibre import Fibre, Floats, PlatePose
 from cosmic.twin.force_settings import FibreSettings
 from cosmic.twin.kinematics import Point
-from cosmic.twin.optics.bent import Give
+from cosmic.twin.optics.bent import Compliance
 from cosmic.twin.tools import Tool
 
 Where = Literal["plate", "held", "stuck", "hanging", "gone"]
@@ -42,7 +42,7 @@ class FibreState:
         Pull between two grippers.
     seen_um : float
         How wide it looks from above: a ribbon in the jaws shows its edge, or its face.
-    give : Give or None
+    compliance : Compliance or None
         How it gives way to the probe, where one gripper holds it.
     """
 
@@ -56,7 +56,7 @@ class FibreState:
     relative_um: Floats
     tension_un: float
     seen_um: float
-    give: Give | None
+    compliance: Compliance | None
     _position: Floats
 
     @property
@@ -106,6 +106,6 @@ def state_of(
         relative,
         tension,
         fibre.seen_um,
-        fibre.give,
+        fibre.compliance,
         position,
     )

@@ -22,7 +22,7 @@ NEAR_UM: Final = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Give:
+class Compliance:
     """How a fibre gives way from its clamp on.
 
     Attributes
@@ -48,7 +48,7 @@ class Give:
         return np.diff(np.interp(edges_um, self.places_um, whole) + inside)
 
 
-def bent(free_um: Floats, give: Give, along_um: float, deflection_um: float) -> Floats:
+def bent(free_um: Floats, compliance: Compliance, along_um: float, deflection_um: float) -> Floats:
     """Return a fibre out of the jaws as a push bends it, shape (m, 2).
 
     Parameters
@@ -62,15 +62,15 @@ def bent(free_um: Floats, give: Give, along_um: float, deflection_um: float) -> 
     """
     arcs = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(free_um, axis=0).T))])
     contact = float(np.interp(along_um, free_um[:, 0], arcs))
-    inside = np.linspace(-give.depth_um, 0.0, INSIDE, endpoint=False)
+    inside = np.linspace(-compliance.depth_um, 0.0, INSIDE, endpoint=False)
     edges = np.concatenate([inside, np.linspace(0.0, contact, CELLS + 1)])
     edges = np.concatenate([edges, np.unique(np.append(arcs[arcs > contact + 1.0], arcs[-1]))])
     x = np.where(edges < 0.0, edges, np.interp(edges, arcs, free_um[:, 0]))
     y = np.where(edges < 0.0, 0.0, np.interp(edges, arcs, free_um[:, 1]))
     natural, steps = np.arctan2(np.diff(y), np.diff(x)), np.hypot(np.diff(x), np.diff(y))
     at = INSIDE + CELLS
-    turns = np.where(np.arange(len(steps)) < at, give.over_um(edges), 0.0)
-    turns[0] += give.softness[0] * give.turn_um
+    turns = np.where(np.arange(len(steps)) < at, compliance.over_um(edges), 0.0)
+    turns[0] += compliance.softness[0] * compliance.turn_um
     height = float(np.interp(along_um, free_um[:, 0], free_um[:, 1]))
 
     def pushed(load: float) -> tuple[Floats, Floats]:

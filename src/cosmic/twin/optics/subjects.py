@@ -10,7 +10,7 @@ from cosmic.twin.felt import Moment, Push
 from cosmic.twin.fibre_state import FibreState
 from cosmic.twin.force_side import ForceSide
 from cosmic.twin.kinematics import Floats, Point, Slide
-from cosmic.twin.optics.bent import Give, bent
+from cosmic.twin.optics.bent import Compliance, bent
 from cosmic.twin.optics.ground import on_plate
 from cosmic.twin.optics.shapes import bridge
 from cosmic.twin.optics.solids import read_solids
@@ -167,7 +167,7 @@ class Subjects:
             line, span = self._between(state, line, tips, towards)
         if push is not None:
             ahead = self._ahead(moment, push, tips, state.anchor, towards)
-            line = _pushed(line, ahead, span if state.give is None else state.give)
+            line = _pushed(line, ahead, span if state.compliance is None else state.compliance)
         line = line * (towards, 1.0, 1.0)
         return Strand(line + start, width)
 
@@ -195,12 +195,12 @@ class Subjects:
         return push.abscissa_um + ahead[1][1] - ahead[0][1], deflection
 
 
-def _pushed(line: Floats, push: tuple[float, float], held: Give | float | None) -> Floats:
+def _pushed(line: Floats, push: tuple[float, float], held: Compliance | float | None) -> Floats:
     """Return a fibre, first the part in the jaws, as the probe bends it.
 
     Parameters
     ----------
-    held : Give or float or None
+    held : Compliance or float or None
         By one gripper, or how far two are apart.
     """
     along, deflection = push

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,12 @@ from cosmic.autonomy.bending.bent_shape import (
     turned_in_jaws,
 )
 from cosmic.autonomy.bending.curved import NaturalShape
+from cosmic.autonomy.bending.fit import fit_bending, fit_campaign, measure_fibre
+from cosmic.autonomy.bending.plan import plan_spans
+from cosmic.autonomy.bending.result import Quality
+from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.autonomy.bending.span import Span
+from oracles.bent_fibre import Rig
 
 Floats = npt.NDArray[np.float64]
 SPAN_UM, PUSHED_UM, NOISE_UM = 600.0, 60.0, 0.8
@@ -150,3 +157,40 @@ def test_what_is_hardly_bent_or_seen_at_few_places_or_near_the_jaws_alone_shows_
     near = BentShape(near.ahead_um[here], near.aside_um[here], NOISE_UM, 100.0, 30.0)
     assert len(near.ahead_um) > 8
     assert fit(near) is None
+
+
+def looked_at(span: Span, *, times: float = 1.0, turned: float = 0.0) -> Span:
+    """Return a push with what an image of an even straight fibre shows of it."""
+    ahead = np.linspace(0.0, 1000.0, 201)
+    shape = NaturalShape(ahead, np.zeros(201), span.nominal_um)
+    places = np.arange(70.0, span.nominal_um - 70.0, 15.0)
+    top = int(np.argmax(span.probe_um))
+    touched = span.probe_um[span.loading][np.argmax(span.force_un[span.loading] > 0.6)]
+    pushed = float(span.probe_um[top] - touched)
+    part = (places + 9.0) / (span.nominal_um + 9.0)
+    aside = (1.0 - turned) * part**2 * (3.0 - part) / 2.0 + turned * places / span.nominal_um
+    force = float(span.force_un[top])
+    bent = BentShape(places, times * pushed * aside, 0.6, float(span.probe_um[top]), force)
+    return replace(span, shape=shape, bent=bent)
+
+
+def measured(seed: int, **image: float) -> tuple[Span, ...]:
+    rig = Rig(5e-11, np.random.default_rng(seed))
+    first, *others = [rig.push(each.span_um, each.stroke_um) for each in plan_spans(1200.0, 5e-11)]
+    return looked_at(first, **image), *others
+
+
+def test_a_value_that_the_image_speaks_against_is_refused_and_says_why() -> None:
+    assert fit_bending(measured(3)).trusted
+    refused = fit_bending(measured(3, times=1.4))
+    assert Quality.SHAPE in refused.flags
+    assert not refused.trusted
+    assert any("span 1: the image shows the fibre bent by" in each for each in refused.reasons)
+
+
+def test_jaws_that_turn_with_all_fibres_refuse_all_of_them() -> None:
+    settings = FitSettings()
+    several = [measure_fibre(measured(n, turned=0.3), settings=settings) for n in range(12)]
+    found = fit_campaign(several, settings=settings)
+    assert all(Quality.SHAPE in each.flags for each in found)
+    assert all("12 fibres show them turn" in each.reasons[-1] for each in found)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from cosmic.twin.optics.bent import Give, bent
+from cosmic.twin.optics.bent import Compliance, bent
 from cosmic.twin.optics.shapes import bridge, lying
 
 
@@ -30,7 +30,7 @@ def test_a_lying_fibre_has_its_length_and_turns_by_its_curl_and_kink(
     assert line[:, 1].mean() == pytest.approx(0.0, abs=1e-9)
 
 
-EVEN = Give(0.0, 0.0, np.array([0.0, 1200.0]), np.ones(2))
+EVEN = Compliance(0.0, 0.0, np.array([0.0, 1200.0]), np.ones(2))
 STRAIGHT = np.array([[0.0, 0.0], [1200.0, 0.0]])
 
 
@@ -52,21 +52,21 @@ def test_a_small_push_bends_it_as_euler_and_bernoulli_say() -> None:
 
 
 def test_a_deep_clamp_and_jaws_that_turn_show_at_the_jaws() -> None:
-    def at_150(give: Give) -> float:
-        line = bent(STRAIGHT, give, 600.0, 40.0)
+    def at_150(compliance: Compliance) -> float:
+        line = bent(STRAIGHT, compliance, 600.0, 40.0)
         return -float(np.interp(150.0, line[:, 0], line[:, 1]))
 
-    deep = Give(50.0, 0.0, EVEN.places_um, EVEN.softness)
+    deep = Compliance(50.0, 0.0, EVEN.places_um, EVEN.softness)
     x = 200.0 / 650.0
     assert at_150(deep) == pytest.approx(40.0 * x * x * (3.0 - x) / 2.0, rel=0.01)
-    turning = Give(0.0, 1e6, EVEN.places_um, EVEN.softness)
+    turning = Compliance(0.0, 1e6, EVEN.places_um, EVEN.softness)
     assert at_150(turning) == pytest.approx(10.0, rel=0.02)
     assert at_150(EVEN) < at_150(deep) < at_150(turning)
 
 
 def test_a_soft_place_is_a_kink() -> None:
     places = np.linspace(0.0, 1200.0, 601)
-    soft = Give(0.0, 0.0, places, 1.0 + 500.0 * (np.abs(places - 300.0) < 12.0))
+    soft = Compliance(0.0, 0.0, places, 1.0 + 500.0 * (np.abs(places - 300.0) < 12.0))
     line = bent(STRAIGHT, soft, 600.0, 30.0)
     assert -np.interp([200.0, 450.0], line[:, 0], line[:, 1]) == pytest.approx([0.0, 15.0], abs=1.5)
 
@@ -83,7 +83,7 @@ def test_a_curled_fibre_keeps_its_length_and_is_bent_at_the_probe(turned: float)
             np.concatenate([[0.0], np.cumsum(np.sin(middle) * step)]),
         ]
     )
-    line = bent(free, Give(20.0, 0.0, EVEN.places_um, EVEN.softness), 600.0, 40.0)
+    line = bent(free, Compliance(20.0, 0.0, EVEN.places_um, EVEN.softness), 600.0, 40.0)
     before = float(np.interp(600.0, free[:, 0], free[:, 1]))
     assert before - np.interp(600.0, line[:, 0], line[:, 1]) == pytest.approx(40.0, abs=0.05)
     assert arc_length(line) == pytest.approx(900.0, rel=1e-3)
