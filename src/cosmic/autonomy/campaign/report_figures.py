@@ -166,7 +166,7 @@ def shape_figure(record: FibreRecord) -> str:
         low, high = min(0.0, float(aside.min())), max(pushed, float(aside.max()))
         x = Axis("place from the tip of the jaws, µm", *around(0.0, shape.at_um))
         y = Axis("pushed aside, µm", *around(low, high))
-        plot = Plot(x, y, f"Bent shape of fibre {record.number} in the image", height=220.0)
+        plot = Plot(x, y, f"Bent shape of fibre {record.number} in the image", height=180.0)
         plot.line(places.tolist(), model.tolist(), GREY)
         plot.points(bent.ahead_um.tolist(), aside.tolist(), BLUE)
         plot.points([shape.at_um], [pushed], ORANGE)
