@@ -48,6 +48,12 @@ class DataBuffer(Generic[T]):
             self._values.clear()
         return values
 
+    def clear(self) -> None:
+        """Forget all values, the newest too; they do not count as lost."""
+        with self._lock:
+            self._values.clear()
+            self._latest = ()
+
     def __len__(self) -> int:
         return len(self._values)
 

@@ -40,6 +40,13 @@ def test_the_latest_value_is_known_after_all_were_taken() -> None:
     assert (buffer.latest(), len(buffer)) == (7, 0)
 
 
+def test_a_buffer_that_is_cleared_has_nothing_and_has_lost_nothing() -> None:
+    buffer: DataBuffer[int] = DataBuffer(2)
+    buffer.put(7)
+    buffer.clear()
+    assert (buffer.latest(), buffer.take(), len(buffer), buffer.lost) == (None, [], 0, 0)
+
+
 def test_a_value_that_is_none_is_a_value() -> None:
     buffer: DataBuffer[None] = DataBuffer()
     buffer.put(None)

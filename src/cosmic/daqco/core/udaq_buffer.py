@@ -6,6 +6,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QMetaMethod, QObject, Signal
 
 from cosmic.daqco.core.chunk import DataChunk
+from cosmic.frame.buffer import DataBuffer
 from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.overrides import override
 
@@ -14,6 +15,13 @@ Receiver = Callable[[DataChunk], None]
 
 class UDaqBuffer(QObject):
     """Joins the acquisition with whoever wants its data; any thread.
+
+    It is a producer for a `Connector`: `buffer` has the newest chunk when `data_ready` is emitted.
+
+    Attributes
+    ----------
+    buffer : DataBuffer
+        Keeps the newest chunk.
 
     Signals
     -------
@@ -28,8 +36,8 @@ class UDaqBuffer(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
+        self.buffer: DataBuffer[DataChunk] = DataBuffer()
         self._arrived: Event[DataChunk] = Event()
-        self._latest: DataChunk | None = None
         self._samples = 0
         self._filled = threading.Event()
         self._connected = False
@@ -42,7 +50,7 @@ class UDaqBuffer(QObject):
     @property
     def latest_chunk(self) -> DataChunk | None:
         """The newest chunk; None before the first."""
-        return self._latest
+        return self.buffer.latest()
 
     @property
     def samples(self) -> int:
@@ -51,7 +59,7 @@ class UDaqBuffer(QObject):
 
     def get_latest_data(self) -> dict[str, float]:
         """Return the newest value of every channel in its physical unit; empty before any."""
-        chunk = self._latest
+        chunk = self.latest_chunk
         return chunk.newest() if chunk is not None else {}
 
     def subscribe(self, receiver: Receiver) -> Unsubscribe:
@@ -68,11 +76,12 @@ class UDaqBuffer(QObject):
     def clear(self) -> None:
         """Forget what was there: another acquisition begins."""
         self._filled.clear()
-        self._latest, self._samples = None, 0
+        self.buffer.clear()
+        self._samples = 0
 
     def put(self, chunk: DataChunk) -> None:
         """Take a chunk and hand it on; acquisition thread."""
-        self._latest = chunk
+        self.buffer.put(chunk)
         self._samples = chunk.first_sample + chunk.samples
         if not self._filled.is_set():
             self._filled.set()

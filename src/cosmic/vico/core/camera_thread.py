@@ -11,6 +11,7 @@ import numpy as np
 from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
+from cosmic.frame.buffer import DataBuffer
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import (
     ConfigError,
@@ -129,7 +130,7 @@ class CameraThread(WorkerThread):
         self._last_id: int | None = None
         self._refused_s: float | None = None
         self._reopen = False
-        self._newest: CameraImage | None = None
+        self._newest: DataBuffer[CameraImage] = DataBuffer()
         self._shown: CameraImage | None = None
         self._looked_s = self._drawn_s = -SEARCH_S
         self._arrived = Condition()
@@ -183,12 +184,12 @@ class CameraThread(WorkerThread):
         a second; a simulated camera would else draw it in the thread that looks.
         """
         self._looked_s = WALL.now_s()
-        return self._shown or self._newest
+        return self._shown or self._newest.latest()
 
     @property
     def last(self) -> CameraImage | None:
         """The newest whole image, for one who wants a certain one and does not look at all."""
-        return self._newest
+        return self._newest.latest()
 
     def on_newest(self, listener: Callable[[], object]) -> Unsubscribe:
         """Call `listener()` in the camera's thread when there is a newer `last`."""
@@ -218,12 +219,12 @@ class CameraThread(WorkerThread):
         forbid_waiting_here("waiting for an image")
 
         def fresh() -> bool:
-            newest = self._newest
+            newest = self._newest.latest()
             return newest is not None and newest.frame.exposed_s >= since_s
 
         with self._arrived:
             self._arrived.wait_for(lambda: fresh() or self._over, timeout_s)
-            newest = self._newest
+            newest = self._newest.latest()
         if newest is None or not fresh():
             self._check_open()
             reason = self.problem or ("it is stopped" if not self._running else "none arrived")
@@ -264,8 +265,8 @@ class CameraThread(WorkerThread):
             self._wanted_running = False
             self._running = False
             camera.stop()
-            if self._newest is not None:
-                self._draw(self._newest)  # it stays, and is drawn while that can be
+            if (newest := self.last) is not None:
+                self._draw(newest)  # it stays, and is drawn while that can be
 
         return self._put(f"Stopping {self.camera_name}", command)
 
@@ -442,7 +443,7 @@ class CameraThread(WorkerThread):
         if frame.status is FrameStatus.COMPLETE:
             self._show(image)
             with self._arrived:
-                self._newest = image
+                self._newest.put(image)
                 self._arrived.notify_all()
             self._renewed.emit()
 
