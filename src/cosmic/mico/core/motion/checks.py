@@ -9,8 +9,7 @@ from typing import Final, NamedTuple, Self, TypeVar
 
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import ALLOWED, MoveVerdict, Reason, refuse
-from cosmic.mico.core.collision.answer import AxisSpan, Spans
-from cosmic.mico.core.collision.checker import CollisionChecker
+from cosmic.mico.core.collision.checker import AxisSpan, CollisionChecker, Spans
 from cosmic.mico.core.motion.lease import Guard
 from cosmic.mico.core.motion.orders import (
     AMPLITUDE_V,
