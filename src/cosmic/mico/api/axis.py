@@ -55,7 +55,8 @@ from cosmic.mico.core.motion.orders import (
     ToEndStop,
 )
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState, Status, class_for
-from cosmic.mico.core.settings import MicoSettings, PositionerSettings
+from cosmic.mico.core.motion.settings import PositionerSettings
+from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 
 

@@ -4,8 +4,8 @@ import pytest
 from pydantic import ValidationError
 
 from cosmic.mico.core.motion.orders import MoveBy, MoveTo, Step
+from cosmic.mico.core.motion.settings import MotionDefaults
 from cosmic.mico.core.poses import Pose
-from cosmic.mico.core.settings import MotionDefaults
 from cosmic.mico.core.trajectory.binding import (
     AxisFacts,
     Bound,

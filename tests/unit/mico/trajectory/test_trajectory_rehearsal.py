@@ -8,7 +8,7 @@ from cosmic.mico.core.collision.checker import NoCollisionModel
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.motion.checks import Limits
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
-from cosmic.mico.core.settings import MotionDefaults
+from cosmic.mico.core.motion.settings import MotionDefaults
 from cosmic.mico.core.trajectory.binding import AxisFacts, PlatformFacts, bind
 from cosmic.mico.core.trajectory.clearance import ClearanceSearch
 from cosmic.mico.core.trajectory.parser import parse

@@ -69,7 +69,7 @@ class Limits:
         return cls(
             largest_step={"um": defaults.largest_step_um, "deg": defaults.largest_step_deg},
             stale_s=settings.watch.stale_s,
-            counted=counted_travels(settings),
+            counted=counted_travels(settings.positioner, defaults),
         )
 
 

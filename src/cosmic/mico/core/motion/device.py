@@ -290,7 +290,9 @@ class Device(WorkerThread):
         """
         found = self.container.positioner(channel)
         counts = found is not None and not found.has_sensor
-        travel = CountedTravel.of(found.settings, self._settings) if found and counts else None
+        travel = None
+        if found and counts:
+            travel = CountedTravel.of(found.settings, self._settings.defaults)
         self.container.set_estimate(channel, travel, position, std)
         self._inbox.put(PublishState(channel))
 

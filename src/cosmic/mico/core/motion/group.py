@@ -19,8 +19,9 @@ from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import FREQUENCY_HZ, Motion, Reservation
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState, class_for
+from cosmic.mico.core.motion.settings import MotionDefaults
 from cosmic.mico.core.motion.straight import AxisTravel, StraightLine
-from cosmic.mico.core.settings import MicoSettings, MotionDefaults
+from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Capabilities, Channel, Controller, MatchedMove
 
 logger = logging.getLogger(__name__)

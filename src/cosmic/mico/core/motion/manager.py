@@ -52,8 +52,9 @@ from cosmic.mico.core.motion.messages import DeviceLost, Order
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import Interval, Motion
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
+from cosmic.mico.core.motion.settings import WatchSettings
 from cosmic.mico.core.motion.stop_latch import StopLatch
-from cosmic.mico.core.settings import MicoSettings, WatchSettings
+from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Channel, Controller
 
 logger = logging.getLogger(__name__)
