@@ -7,11 +7,10 @@ from cosmic.frame.clock import ManualClock
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.inbox import Inbox
 from cosmic.mico.core.motion.channel import ChannelController
-from cosmic.mico.core.motion.channel_context import AxisReports, ChannelContext
+from cosmic.mico.core.motion.channel_context import AxisReports, ChannelContext, GateQueue
 from cosmic.mico.core.motion.data_container import DeviceDataContainer
 from cosmic.mico.core.motion.device import Device
 from cosmic.mico.core.motion.discovery import ChannelDiscovery
-from cosmic.mico.core.motion.gate_queue import GateQueue
 from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.messages import Message
 from cosmic.mico.hw.interface import Event

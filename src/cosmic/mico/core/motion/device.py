@@ -29,12 +29,11 @@ from cosmic.frame.operation import Task
 from cosmic.frame.threads import JOIN_TIMEOUT_S, WorkerThread
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.motion.channel import ChannelController
-from cosmic.mico.core.motion.channel_context import AxisReports, ChannelContext
+from cosmic.mico.core.motion.channel_context import AxisReports, ChannelContext, GateQueue
 from cosmic.mico.core.motion.data_container import DeviceDataContainer
 from cosmic.mico.core.motion.discovery import ChannelDiscovery
 from cosmic.mico.core.motion.driver_watch import DriverCalls
 from cosmic.mico.core.motion.gate import Gate
-from cosmic.mico.core.motion.gate_queue import GateQueue
 from cosmic.mico.core.motion.messages import (
     DeviceLost,
     GateAnswer,
