@@ -227,6 +227,8 @@ class DeviceManager(QObject):
         Several axes were started back to back; in the thread of a device.
     links_changed()
         Axes were linked, or are linked no more.
+    position_changed, state_changed, movement_begun, movement_ended, movement_refused
+        Those of every `Device` there is or comes to be, in its thread.
     """
 
     changed = Signal()
@@ -234,6 +236,11 @@ class DeviceManager(QObject):
     group_refused = Signal(object)
     group_started = Signal(object)
     links_changed = Signal()
+    position_changed = Signal(object)
+    state_changed = Signal(object)
+    movement_begun = Signal(object)
+    movement_ended = Signal(object)
+    movement_refused = Signal(object)
 
     def __init__(
         self,
@@ -475,8 +482,14 @@ class DeviceManager(QObject):
             settings=self.settings,
             policy=self._policy,
         )
-        device.lost.connect(self._on_device_lost, Qt.ConnectionType.DirectConnection)
-        device.stop_late.connect(self._on_stop_late, Qt.ConnectionType.DirectConnection)
+        direct = Qt.ConnectionType.DirectConnection
+        device.lost.connect(self._on_device_lost, direct)
+        device.stop_late.connect(self._on_stop_late, direct)
+        device.position_changed.connect(self.position_changed, direct)
+        device.state_changed.connect(self.state_changed, direct)
+        device.movement_begun.connect(self.movement_begun, direct)
+        device.movement_ended.connect(self.movement_ended, direct)
+        device.movement_refused.connect(self.movement_refused, direct)
         return device
 
     def _start(self, numbers: Collection[int]) -> None:

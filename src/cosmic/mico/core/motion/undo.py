@@ -13,7 +13,6 @@ from PySide6.QtCore import QObject, Qt, Signal
 from cosmic.frame.errors import NotAvailable, refusal
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import Reason, refuse
-from cosmic.mico.core.motion.device import Device
 from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.messages import MovementBegun, Order
 from cosmic.mico.core.motion.orders import Motion, MoveTo, Step
@@ -64,20 +63,9 @@ class ClosedGrippers(QObject):
 
     def __init__(self, manager: DeviceManager, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._manager = manager
         self._widest: dict[str, float] = {}
         self._now: dict[str, float] = {}
-        self._joined: dict[int, Device] = {}
-        self._join_devices()
-        manager.changed.connect(self._join_devices, Qt.ConnectionType.DirectConnection)
-
-    def _join_devices(self) -> None:
-        for index, device in self._manager.devices.items():
-            if self._joined.get(index) is not device:
-                self._joined[index] = device
-                device.state_changed.connect(
-                    self._on_state_changed, Qt.ConnectionType.DirectConnection
-                )
+        manager.state_changed.connect(self._on_state_changed, Qt.ConnectionType.DirectConnection)
 
     def _on_state_changed(self, state: PositionerState) -> None:
         position = state.position
@@ -161,18 +149,10 @@ class UndoHistory(QObject):
         self._group_of = {
             name: group.title for group in manager.settings.group for name in group.positioners
         }
-        self._joined: dict[int, Device] = {}
-        self._join_devices()
-        manager.changed.connect(self._join_devices, Qt.ConnectionType.DirectConnection)
-        self._cautions.on_touch(self._on_touch)
-
-    def _join_devices(self) -> None:
         direct = Qt.ConnectionType.DirectConnection
-        for index, device in self._manager.devices.items():
-            if self._joined.get(index) is not device:
-                self._joined[index] = device
-                device.movement_begun.connect(self._on_movement_begun, direct)
-                device.state_changed.connect(self._on_state_changed, direct)
+        manager.movement_begun.connect(self._on_movement_begun, direct)
+        manager.state_changed.connect(self._on_state_changed, direct)
+        self._cautions.on_touch(self._on_touch)
 
     def group_of(self, axis: str) -> str:
         """Return the assembly that an axis belongs to; an axis of no group is its own."""
