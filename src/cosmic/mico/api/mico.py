@@ -35,12 +35,11 @@ from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.api.application_base import PATH_BUDGET_S, MicoApplicationBase
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.axis_group import AxisGroup
-from cosmic.mico.api.collision import Collision
+from cosmic.mico.api.collision import Collision, LiveClearance
 from cosmic.mico.api.companion import MicoCompanion
 from cosmic.mico.api.entry import Number, as_number, one_line, source_of
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.initialisation import Confirm
-from cosmic.mico.api.live_clearance import LiveClearance
 from cosmic.mico.api.news import (
     AxisBegun,
     AxisEnded,
