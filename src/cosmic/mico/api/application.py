@@ -21,8 +21,7 @@ from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.collision.model import SceneModel
-from cosmic.mico.core.mode import Mode
-from cosmic.mico.core.motion.manager import DeviceManager
+from cosmic.mico.core.motion.manager import DeviceManager, Mode
 from cosmic.mico.core.motion.undo import Cautions, ClosedGrippers, UndoHistory
 from cosmic.mico.core.path_planner import PathPlanner
 from cosmic.mico.core.sequence.report import SequenceReport

@@ -324,7 +324,7 @@ class Axis(PlanMovable, Declared):
             return exc.verdict
         motion = MoveTo(target, self.unit)
         if self._far is None:
-            return self._manager.check({self._name: motion}, consent=consent)
+            return self._manager.groups.check({self._name: motion}, consent=consent)
         if not may_wait_here():
             return self._far.foresee({self._name: motion}, consent)
         try:
@@ -337,7 +337,7 @@ class Axis(PlanMovable, Declared):
     @command
     def check_motion(self, motion: SentMotion, *, consent: bool = False) -> MoveVerdict:
         """Return the gate's answer to a motion in gate coordinates, without moving."""
-        return self._manager.check({self._name: motion}, consent=consent)
+        return self._manager.groups.check({self._name: motion}, consent=consent)
 
     # Moving
 

@@ -38,7 +38,7 @@ from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.collision import Collision, LiveClearance
 from cosmic.mico.api.companion import MicoCompanion
 from cosmic.mico.api.entry import Number, as_number, one_line, source_of
-from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.group_movement import GroupMovement
 from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.news import (
     AxisBegun,
@@ -71,7 +71,7 @@ from cosmic.mico.core.sequence.report import SequenceReport
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 from cosmic.mico.core.trajectory.binding import AxisFacts, PlatformFacts
-from cosmic.mico.core.trajectory_recorder import Recorded
+from cosmic.mico.core.trajectory.recorder import Recorded
 from cosmic.mico.hw.interface import PositionerKind
 
 SCENE_LIMIT_S: Final = 10.0
@@ -520,7 +520,7 @@ class Mico(Declared):
             stopped = GroupMovement.followed(f"the movement of {', '.join(motions)}")
             stopped.fail(MoveCancelled(f"{', '.join(motions)}: halted before they started"))
             return stopped
-        orders = self._manager.order_together(
+        orders = self._manager.groups.order_together(
             motions,
             source=source_of(source),
             consent=consent,
@@ -577,7 +577,7 @@ class Mico(Declared):
         self, motions: dict[str, SentMotion], *, consent: bool = False
     ) -> MoveVerdict:
         """Return the gate's answer to motions in gate coordinates, without moving."""
-        return self._manager.check(motions, consent=consent)
+        return self._manager.groups.check(motions, consent=consent)
 
     def _foreseen(self, motions: Mapping[str, Motion], consent: bool) -> MoveVerdict:
         reason = self.stop_state.reason

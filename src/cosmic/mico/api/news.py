@@ -26,7 +26,7 @@ from cosmic.mico.core.motion.orders import (
     ToEndStop,
 )
 from cosmic.mico.core.motion.positioner import PositionerState, class_for, positions_of
-from cosmic.mico.core.trajectory_recorder import (
+from cosmic.mico.core.trajectory.recorder import (
     RecordedBegin,
     RecordedEnd,
     resting_of,

@@ -16,7 +16,7 @@ from cosmic.mico.core.trajectory.binding import (
 )
 from cosmic.mico.core.trajectory.mirror import mirrored
 from cosmic.mico.core.trajectory.model import TrajectoryError
-from cosmic.mico.core.trajectory.parser import parse
+from cosmic.mico.core.trajectory.reader import parse
 from cosmic.mico.core.trajectory.settings import MirrorSettings
 from cosmic.mico.core.trajectory.writer import to_text
 

@@ -302,7 +302,7 @@ class UndoHistory(QObject):
             for name, motion in motions.items()
             if isinstance(motion, MoveTo)
         }
-        return self._manager.order_together(motions, source=UNDO, slow_hz=slow_hz)
+        return self._manager.groups.order_together(motions, source=UNDO, slow_hz=slow_hz)
 
     def _slow_hz(self, name: str, unit: str) -> int:
         defaults, undo = self._manager.settings.defaults, self._manager.settings.undo
