@@ -103,7 +103,7 @@ class LegMover:
         return error
 
     def _set_frequency(self, axis: str, speed: float) -> None:
-        usual = self._usual.setdefault(axis, self._site.frequency_hz(axis))
+        usual = self._usual.setdefault(axis, self._site.manager.usual_frequency_hz(axis))
         within_hz = self._manager.state(axis).frequency_range_hz
         hertz = scaled_hz(self._wanted.get(axis) or usual, speed, within_hz)
         if hertz != self._sent.get(axis, usual):
