@@ -24,10 +24,9 @@ from cosmic.vico.gui.camera_chooser import CameraChooser
 from cosmic.vico.gui.chain_panel import ChainPanel
 from cosmic.vico.gui.contrast_panel import ContrastPanel
 from cosmic.vico.gui.correct_button import CorrectButton
-from cosmic.vico.gui.ghost_layer import GhostLayer
 from cosmic.vico.gui.image_tools import ImageTools
 from cosmic.vico.gui.image_view import CameraImageView
-from cosmic.vico.gui.layers import CornerText, Crosshair, Note, ScaleBar
+from cosmic.vico.gui.layers import CornerText, Crosshair, GhostLayer, Note, ScaleBar
 from cosmic.vico.gui.levels import Histogram, histogram
 from cosmic.vico.gui.mark_layer import MarkLayer
 from cosmic.vico.gui.record_bar import RecordBar
