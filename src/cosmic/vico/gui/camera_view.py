@@ -218,8 +218,8 @@ class CameraView(QWidget):
             (row.found, self.seen),
         ):
             button.toggled.connect(_shower(layer, view))
-        self.contrast.levels_changed.connect(view.set_levels)
-        self.contrast.marks_changed.connect(view.set_marks)
+        self.contrast.levels_changed.connect(view.pixels.set_levels)
+        self.contrast.marks_changed.connect(view.pixels.set_marks)
         view.pointed.connect(self._on_pointed)
         for messages in (self.calibrate.message, self.correct.message, self.tools.message):
             messages.connect(self.say)
@@ -272,7 +272,7 @@ class CameraView(QWidget):
         """Show numbers, histogram and state."""
         image = self.view.image
         if image is not None and image is self._newest:
-            self._histogram = histogram(image.data, self.view.full)
+            self._histogram = histogram(image.data, self.view.pixels.full)
             self.contrast.show_histogram(self._histogram)
         self.status.refresh(self._histogram)
         self._readouts += 1
@@ -325,7 +325,7 @@ class CameraView(QWidget):
         if text == self.note.text:
             return
         self.note.text = text
-        self.view.set_greyed(bool(text))
+        self.view.pixels.set_greyed(bool(text))
         self.view.redraw()
 
     def refresh(self) -> None:
