@@ -21,20 +21,13 @@ from cosmic.frame.errors import (
 )
 from cosmic.frame.events import notify
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.network.caller import JOG_LIMIT_S, MOVE_LIMIT_S
+from cosmic.frame.network.caller import JOG_LIMIT_S, MOVE_LIMIT_S, one_line, source_of
 from cosmic.frame.operation import wait_or_cancel
 from cosmic.frame.threads import may_wait_here
 from cosmic.frame.units import AxisUnit
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.api.axis_numbers import Number, as_number, as_whole, finite
 from cosmic.mico.api.axis_orders import AxisOrders
-from cosmic.mico.api.entry import (
-    Number,
-    as_number,
-    as_whole,
-    finite,
-    one_line,
-    source_of,
-)
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.news import SentMotion
 from cosmic.mico.api.plan_movable import PlanMovable

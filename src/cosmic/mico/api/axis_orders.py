@@ -5,8 +5,8 @@ from threading import Lock
 from typing import Final
 
 from cosmic.frame.errors import CosmicError, MoveCancelled
-from cosmic.frame.network.caller import current_call
-from cosmic.mico.api.entry import caller_token, finite, source_of
+from cosmic.frame.network.caller import caller_token, current_call, source_of
+from cosmic.mico.api.axis_numbers import finite
 from cosmic.mico.api.group_movement import GroupMovement, LinkedMovement
 from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.manager import DeviceManager

@@ -23,7 +23,7 @@ from cosmic.frame.errors import (
     UnknownAxisError,
 )
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.network.caller import current_call
+from cosmic.frame.network.caller import current_call, one_line, source_of
 from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.transport import Rule
 from cosmic.frame.operation import Operation, Progress, Task, wait_or_cancel
@@ -35,9 +35,9 @@ from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.api.application_base import PATH_BUDGET_S, MicoApplicationBase
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.axis_group import AxisGroup
+from cosmic.mico.api.axis_numbers import Number, as_number
 from cosmic.mico.api.collision import Collision, LiveClearance
 from cosmic.mico.api.companion import MicoCompanion
-from cosmic.mico.api.entry import Number, as_number, one_line, source_of
 from cosmic.mico.api.group_movement import GroupMovement
 from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.news import (

@@ -15,10 +15,10 @@ from cosmic.frame.declaration import Declared, command, part
 from cosmic.frame.errors import DeviceTimeout, NotAvailable, RecordingError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.kept_file import write_whole
+from cosmic.frame.network.caller import caller_token, source_of
 from cosmic.frame.network.transfer import transferable
 from cosmic.frame.operation import Operation, Progress
 from cosmic.frame.weakly import weakly
-from cosmic.mico.api.entry import caller_token, source_of
 from cosmic.mico.api.trajectory_player import SPEEDS, Players, TrajectoryPlayer, text_of
 from cosmic.mico.api.trajectory_recording import Recordings, TrajectoryRecording
 from cosmic.mico.api.trajectory_site import TrajectorySite
