@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.figures import Figure, main, percentile
-from cosmic.mico.core.collision.answer import AxisSpan, Spans, pack_spans
+from cosmic.mico.core.collision.checker import AxisSpan, Spans, pack_spans
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.collision.helper_link import GateProcess
 from cosmic.mico.core.collision.model import SceneModel

@@ -17,7 +17,7 @@ import numpy as np
 from typing_extensions import override
 
 from benchmarks.figures import Figure, main, percentile
-from cosmic.mico.core.collision.answer import AxisSpan
+from cosmic.mico.core.collision.checker import AxisSpan
 from cosmic.mico.core.collision.model import (
     Drive,
     Joint,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.figures import Figure, main, percentile
-from cosmic.mico.core.collision.answer import AxisSpan, Spans
+from cosmic.mico.core.collision.checker import AxisSpan, Spans
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.collision.scene_loader import load_scene
 from cosmic.mico.core.collision.sweep import Sweep

@@ -32,7 +32,7 @@ from cosmic.app.configuration.network import serving
 from cosmic.app.stations.host import StationHost
 from cosmic.frame.errors import CosmicError, MoveRefused
 from cosmic.mico.api.trajectory_state import PlayState
-from cosmic.mico.core.trajectory.parser import parse
+from cosmic.mico.core.trajectory.reader import parse
 
 NAME = "stop"
 CALL = "SA_Stop_A"

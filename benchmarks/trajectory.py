@@ -12,7 +12,7 @@ from collections.abc import Callable
 import cosmic
 from benchmarks.figures import Figure, main
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.core.trajectory.parser import parse
+from cosmic.mico.core.trajectory.reader import parse
 
 NAME = "trajectory"
 LINES = 10_000

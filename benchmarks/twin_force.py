@@ -51,7 +51,7 @@ class Rig:
     def touch(self) -> None:
         """Bring the probe to the fibre: what is solved once for a grasp is a figure of its own."""
         self.now_s = self.go("probe.y", -4986.0, 2000.0) + 0.01
-        self.force_side.moment(self.now_s)
+        self.force_side.timeline.moment(self.now_s)
 
     def cost(self, duration_s: float, *reads: Read) -> float:
         """Return CPU seconds for a second of platform time while `reads` are asked."""
@@ -92,7 +92,7 @@ def second_s(rig: Rig, duration_s: float) -> tuple[float, float, float]:
     reads = tuple(sensors[name].volts for name in ("force", "spare"))
     for name, target in (("left.x", 3600.0), ("left.z", -810.0), ("probe.y", -4950.0)):
         rig.now_s = rig.go(name, target, 2000.0) + 0.01
-        rig.force_side.moment(rig.now_s)
+        rig.force_side.timeline.moment(rig.now_s)
     still_s = rig.cost(duration_s, *reads)
     rig.touch()
     rig.go("probe.y", -5030.0, 50.0 / (2.0 * duration_s))

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cosmic.frame.operation import Progress, Task
     from cosmic.frame.verdict import MoveVerdict, Reason
     from cosmic.mico.api.axis import Axis
-    from cosmic.mico.api.group import GroupMovement
+    from cosmic.mico.api.group_movement import GroupMovement
     from cosmic.mico.api.jogging import Jogging
     from cosmic.mico.api.mico import Mico
     from cosmic.mico.core.motion.movement import Movement
@@ -67,7 +67,7 @@ _HOMES = {
     "cosmic.frame.verdict": ("MoveVerdict", "Reason"),
     "cosmic.mico.api.axis": ("Axis",),
     "cosmic.mico.api.jogging": ("Jogging",),
-    "cosmic.mico.api.group": ("GroupMovement",),
+    "cosmic.mico.api.group_movement": ("GroupMovement",),
     "cosmic.mico.api.mico": ("Mico",),
     "cosmic.mico.core.motion.movement": ("Movement",),
     "cosmic.vico.api.measure": ("Measurement", "measure"),

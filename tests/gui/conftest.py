@@ -14,7 +14,8 @@ from cosmic.app.configuration import platform_file
 from cosmic.app.windows import alarm_watch
 from cosmic.daqco.api import application as daqco_application
 from cosmic.mico.core.collision import collision_manager, scene_loader
-from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
+from cosmic.mico.core.collision.answer import Approach, SweepAnswer
+from cosmic.mico.core.collision.checker import Spans
 from cosmic.mico.core.collision.clear_travel import clear_travel
 from cosmic.mico.core.collision.collision_manager import Answering
 from cosmic.mico.core.collision.model import BodyPair, SceneModel

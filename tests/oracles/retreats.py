@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosmic.mico.core.collision.answer import AxisSpan
+from cosmic.mico.core.collision.checker import AxisSpan
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
 

@@ -74,7 +74,7 @@ from cosmic.frame.renamed import Renamed
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.collision import Collision
-from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.group_movement import GroupMovement
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.move_status import MoveStatus

@@ -20,7 +20,7 @@ from cosmic.daqco.core.settings import (
     OutputSettings,
     ScaleSettings,
 )
-from cosmic.mico.core.link_settings import LinkSettings
+from cosmic.mico.core.motion.settings import LinkSettings
 from cosmic.mico.core.sequence.settings import InitialisationSettings, StepSettings
 from cosmic.mico.core.settings import ContactSettings as MicoContactSettings
 from cosmic.mico.core.settings import ControllerSettings as MicoControllerSettings

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cosmic.mico.core.collision.answer import AxisSpan
+from cosmic.mico.core.collision.checker import AxisSpan
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.collision.scene_loader import load_scene
 from cosmic.mico.core.collision.sweep import Sweep

@@ -20,7 +20,7 @@ from cosmic.mico.core.collision.scene_loader import load_scene
 from cosmic.mico.core.poses import read_poses
 from cosmic.mico.core.teleoperation.profile_book import ProfileBook
 from cosmic.mico.core.teleoperation.settings import TeleoperationSettings
-from cosmic.mico.core.trajectory.parser import load as load_trajectory
+from cosmic.mico.core.trajectory.reader import load as load_trajectory
 from cosmic.mico.hw.recorded_input import read_events
 from cosmic.twin.settings import TwinSettings
 

@@ -28,18 +28,18 @@ def test_the_force_rises_while_the_probe_is_driven_into_the_fibre():
             assert mico.check({"probe.y": place}).allowed
             mico["probe.y"].move_to(place)
             scene.clock.sleep(0.1)
-            truth = scene.force_side.moment(scene.clock.now_s())
+            truth = scene.force_side.timeline.moment(scene.clock.now_s())
             seen.append(volts(scene) - zero)
             assert seen[-1] == pytest.approx(0.01 * truth.force_un, rel=0.05)
         assert np.diff(seen) == pytest.approx([0.2, 0.2], rel=0.2), "2 uN/um at 10 mV/uN"
         (push,) = truth.pushes
         assert (push.fibre, push.abscissa_um) == (0, pytest.approx(400.0, abs=2.0))
         mico["probe.y"].move_to(-4900.0)
-        assert scene.force_side.moment(scene.clock.now_s()).force_un == 0.0
+        assert scene.force_side.timeline.moment(scene.clock.now_s()).force_un == 0.0
 
 
 def test_initialising_keeps_the_fibre_in_the_jaws():
     with platform() as (mico, _, scene):
         mico.initialise()
         assert scene.force_side is not None
-        assert scene.force_side.moment(scene.clock.now_s()).fibres[0].held_by == ("left",)
+        assert scene.force_side.timeline.moment(scene.clock.now_s()).fibres[0].held_by == ("left",)

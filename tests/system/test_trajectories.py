@@ -35,8 +35,8 @@ from cosmic.mico.api.trajectory_start import AwayFromStartError
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
 from cosmic.mico.core.motion.messages import MovementBegun
 from cosmic.mico.core.trajectory.model import Trajectory, TrajectoryError
-from cosmic.mico.core.trajectory.parser import parse
-from cosmic.mico.core.trajectory_recorder import RecordedBegin, TrajectoryRecorder
+from cosmic.mico.core.trajectory.reader import parse
+from cosmic.mico.core.trajectory.recorder import RecordedBegin, TrajectoryRecorder
 from system.simulated_platform import platform, wait_until
 
 HEAD = "cosmic-trajectory 1\nplatform any\n"

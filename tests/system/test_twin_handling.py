@@ -66,7 +66,7 @@ def _work(mico: Mico, scene: Scene, *, watched: bool) -> None:
             z.move_by(way)
         if watched:
             assert scene.force_side is not None
-            assert scene.force_side.moment(scene.clock.now_s())
+            assert scene.force_side.timeline.moment(scene.clock.now_s())
 
 
 def test_the_fate_of_fibres_is_the_same_at_rate_1_and_at_rate_20() -> None:

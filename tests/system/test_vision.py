@@ -279,14 +279,14 @@ def test_a_refused_move_ends_a_calibration_and_the_gripper_goes_back(
     stood, before = at_right(lab.rig), lab.rig.vico.calibrated
     refused = cosmic.LimitError(lab.rig.mico["right.x"].check(9999.0))
     manager = lab.rig.mico.application.manager
-    real, moves = manager.order_together, iter(range(100))
+    real, moves = manager.groups.order_together, iter(range(100))
 
     def refuse_the_sixth(motions: Any, **kwargs: Any) -> Any:
         if next(moves) == 5:
             raise refused
         return real(motions, **kwargs)
 
-    monkeypatch.setattr(manager, "order_together", refuse_the_sixth)
+    monkeypatch.setattr(manager.groups, "order_together", refuse_the_sixth)
     with pytest.raises(cosmic.LimitError):
         lab.rig.vico.calibrate_stage("right").wait(30.0)
     assert at_right(lab.rig) == pytest.approx(stood, abs=1.0)

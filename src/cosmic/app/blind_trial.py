@@ -18,7 +18,6 @@ from typing import Any, Final, Self
 
 import numpy as np
 
-import cosmic
 from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.bending.fit import (
     Certificate,
@@ -128,7 +127,7 @@ def sealed_program() -> Path:
     TrialError
         It is not there.
     """
-    package = Path(cosmic.__file__).parent
+    package = Path(__file__).parents[1]
     for path in (
         package / "app" / "sealed_session.py",
         package.parents[1] / "tests" / "oracles" / "sealed_session.py",

@@ -13,10 +13,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Final
 
-from cosmic import __version__
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.interruption import Interrupted, interruptible
 from cosmic.frame.log import set_up_logging
+from cosmic.frame.version import __version__
 
 logger = logging.getLogger(__name__)
 

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from cosmic.twin.felt import Moment
 from cosmic.twin.force_sensor import ForceSensor
 from cosmic.twin.force_settings import FibreSettings
 from cosmic.twin.guideways import Guideways
@@ -45,7 +44,7 @@ class ForceSide:
         As twin.toml names them. Reading one is all that an acquisition board may do here; the
         rest is the truth, for images, logs and tests.
     timeline : Timeline
-        What was felt when, as it is worked out.
+        What was felt when, and all that touches and lies where, as it is worked out.
     offsets : ToolOffsets
         How far tools are from where the drawing has them.
 
@@ -98,25 +97,6 @@ class ForceSide:
             guideways=self.guideways,
             sense=behind[0].transducer.signal_un if behind else None,
         )
-
-    def force_un(self, times_s: Floats) -> Floats:
-        """Return the true force on the probe, uN, positive when it is pushed back.
-
-        Parameters
-        ----------
-        times_s : ndarray, shape (n,), float64
-            Rising; not later than now, and not more than some seconds ago.
-        """
-        return self.timeline.force_un(times_s)
-
-    def moment(self, now_s: float) -> Moment:
-        """Return the whole truth now: force, what touches where, each fibre's state."""
-        return self.timeline.moment(now_s)
-
-    @property
-    def unseen(self) -> int:
-        """How many movements of one stage nobody has looked at yet, at most."""
-        return self.timeline.unseen
 
     def _signal_un(self, times_s: Floats) -> Floats:
         return self.timeline.signal_un(times_s)

@@ -154,7 +154,7 @@ class Timeline:
             self._lock.release()
 
     def force_un(self, times_s: Floats) -> Floats:
-        """Return the force on the probe, uN, positive when it is pushed back.
+        """Return the true force on the probe, uN, positive when it is pushed back.
 
         Parameters
         ----------
@@ -178,7 +178,10 @@ class Timeline:
         return np.asarray(np.interp(times_s, times, signals))
 
     def moment(self, time_s: float) -> Moment:
-        """Return the whole truth at `time_s`, or at the latest look if that is later."""
+        """Return the whole truth at `time_s`: force, what touches where, each fibre's state.
+
+        At the latest look, if that is later.
+        """
         with self._lock:
             self._advance(time_s)
             return self._workspace.moment(self._times_s[-1], self._values, self._felt)

@@ -8,7 +8,7 @@ from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import State
 from cosmic.mico.core.motion.positioner import Confidence
-from cosmic.mico.core.settings import MotionDefaults
+from cosmic.mico.core.motion.settings import MotionDefaults
 from cosmic.mico.gui.axis_table import AxisRow
 from cosmic.mico.gui.card import ConfidenceMark
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI

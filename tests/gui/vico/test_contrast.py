@@ -35,25 +35,25 @@ def panel(qtbot, view, camera):
 
 
 def test_once_stretches_the_contrast_and_the_next_image_does_not(qtbot, panel, view, camera):
-    assert view.view.levels == Levels(0.0, 255.0)
+    assert view.view.pixels.levels == Levels(0.0, 255.0)
     click(qtbot, panel.once)
-    levels = view.view.levels
+    levels = view.view.pixels.levels
     assert levels.low == pytest.approx(40, abs=2)
     assert levels.high == pytest.approx(90, abs=2)
     camera.push(dim(100, 200))
     qtbot.waitUntil(lambda: panel.plot.histogram.percentile(50) > 120)
-    assert view.view.levels == levels
+    assert view.view.pixels.levels == levels
 
 
 def test_auto_follows_the_images_and_a_typed_level_ends_it(qtbot, panel, view, camera):
     click(qtbot, panel.auto)
     camera.push(dim(100, 200))
-    qtbot.waitUntil(lambda: view.view.levels.low == pytest.approx(100, abs=2))
+    qtbot.waitUntil(lambda: view.view.pixels.levels.low == pytest.approx(100, abs=2))
     enter(qtbot, panel.low, "50")
     assert not panel.auto.isChecked()
-    assert view.view.levels.low == 50.0
+    assert view.view.pixels.levels.low == 50.0
     click(qtbot, panel.reset)
-    assert view.view.levels == Levels(0.0, 255.0)
+    assert view.view.pixels.levels == Levels(0.0, 255.0)
     assert panel.high.text() == "255"
 
 
@@ -62,7 +62,7 @@ def test_black_above_white_is_refused_and_keeps_its_text(qtbot, panel, view):
     enter(qtbot, panel.low, "120")
     assert "not below 100" in panel.low.reason
     assert panel.low.text() == "120"
-    assert view.view.levels == Levels(0.0, 100.0)
+    assert view.view.pixels.levels == Levels(0.0, 100.0)
     qtbot.keyClick(panel.low, Qt.Key.Key_Escape)
     assert (panel.low.text(), panel.low.reason) == ("0", "")
 
@@ -73,7 +73,7 @@ def test_a_level_outside_the_range_is_refused(qtbot, panel, view):
         enter(qtbot, panel.high, text)
         assert panel.high.reason, text
         assert panel.high.text() == text
-        assert view.view.levels == Levels(0.0, 255.0)
+        assert view.view.pixels.levels == Levels(0.0, 255.0)
         qtbot.keyClick(panel.high, Qt.Key.Key_Escape)
         assert panel.high.reason == ""
 
@@ -83,9 +83,9 @@ def test_the_range_is_that_of_the_pixel_format(qtbot, panel, view, camera):
     deep = (dim().astype(np.uint16)) * 16
     camera.push(deep, pixel_format=PixelFormat.MONO12)
     qtbot.waitUntil(lambda: panel.plot.histogram.full == 4095)
-    assert view.view.levels.low == pytest.approx(40 * 16, rel=0.05)
+    assert view.view.pixels.levels.low == pytest.approx(40 * 16, rel=0.05)
     click(qtbot, panel.reset)
-    assert view.view.levels == Levels(0.0, 4095.0)
+    assert view.view.pixels.levels == Levels(0.0, 4095.0)
 
 
 def test_the_share_of_lost_pixels_is_reported(qtbot, panel, view, camera):

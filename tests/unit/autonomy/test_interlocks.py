@@ -12,8 +12,8 @@ from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.udaq_buffer import UDaqBuffer
 from cosmic.frame.clock import WALL
+from cosmic.mico.core.motion.cautions import Cautions
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
-from cosmic.mico.core.motion.undo import Cautions
 from cosmic.mico.hw.interface import Channel, PositionerKind
 
 RATE_HZ = 1000.0

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise, product
 
-from cosmic.mico.core.collision.answer import AxisSpan
+from cosmic.mico.core.collision.checker import AxisSpan
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
 from cosmic.mico.core.planning.planner import plan_path

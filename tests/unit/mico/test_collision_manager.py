@@ -13,8 +13,9 @@ from typing_extensions import override
 
 from cosmic.frame.errors import NotAvailable, UnknownAxisError
 from cosmic.frame.verdict import MoveVerdict, Reason
-from cosmic.mico.core.collision.answer import Approach, AxisSpan, Spans, SweepAnswer
+from cosmic.mico.core.collision.answer import Approach, SweepAnswer
 from cosmic.mico.core.collision.callback import CollisionCallbackBase, Response
+from cosmic.mico.core.collision.checker import AxisSpan, Spans
 from cosmic.mico.core.collision.clear_travel import clear_travel
 from cosmic.mico.core.collision.collision_manager import Answering, CollisionManager
 from cosmic.mico.core.collision.helper_link import GateProcess, NoAnswerError

@@ -10,8 +10,8 @@ import cosmic
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.frame.threads import running_threads
-from cosmic.mico.core.mode import Mode
 from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander
+from cosmic.mico.core.motion.manager import Mode
 from cosmic.mico.core.motion.positioner import Status
 from cosmic.mico.hw.interface import PositionerKind
 from unit.mico.rigs import listen, mico, wait_until

@@ -6,11 +6,11 @@ import queue
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.inbox import Inbox
-from cosmic.mico.core.motion.channel_context import AxisReports, ChannelContext
+from cosmic.mico.core.motion.channel import ChannelController
+from cosmic.mico.core.motion.channel_context import AxisReports, ChannelContext, GateQueue
 from cosmic.mico.core.motion.data_container import DeviceDataContainer
 from cosmic.mico.core.motion.device import Device
 from cosmic.mico.core.motion.discovery import ChannelDiscovery
-from cosmic.mico.core.motion.gate_queue import GateQueue
 from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.messages import Message
 from cosmic.mico.hw.interface import Event
@@ -39,40 +39,46 @@ def test_a_device_is_not_introduced_before_each_of_its_axes_was_asked_where_it_i
     device = Device(
         controller, container, gate=manager.gate, clock=clock, settings=mico, policy=policy
     )
-    discovery = ChannelDiscovery(
-        ChannelContext(
-            controller=controller,
-            container=container,
-            gate=manager.gate,
-            clock=clock,
-            settings=mico,
-            queries=GateQueue(manager.gate, clock=clock, inbox=inbox, policy=policy, device=0),
-            reports=AxisReports(device, container),
-            inbox=inbox,
-        )
+    context = ChannelContext(
+        controller=controller,
+        container=container,
+        gate=manager.gate,
+        clock=clock,
+        settings=mico,
+        queries=GateQueue(manager.gate, clock=clock, inbox=inbox, policy=policy, device=0),
+        reports=AxisReports(device, container),
+        inbox=inbox,
     )
+    discovery = ChannelDiscovery(context)
+    axes: dict[int, ChannelController] = {}
+
+    def take(event: Event) -> None:
+        assert event.channel is not None
+        channel = event.channel.channel
+        if channel in axes:
+            axes[channel].monitor.take(event)
+            return
+        found = discovery.take(event, channel)
+        if found is not None:
+            axes[channel] = ChannelController(found, context)
+            axes[channel].begin()
 
     def let_it_answer() -> None:
         for event in waiting(controller):
             container.apply(event)
-            assert event.channel is not None
-            axis = discovery.channels.get(event.channel.channel)
-            if axis is None:
-                discovery.take(event, event.channel.channel)
-            else:
-                axis.monitor.take(event)
-            discovery.look()
+            take(event)
+            discovery.look({number for number, axis in axes.items() if axis.monitor.located})
 
     discovery.begin()
     let_it_answer()
     first, second = waiting(controller)  # the types of both channels
     container.apply(first)
     container.apply(second)
-    discovery.take(first, 0)
+    take(first)
     let_it_answer()
-    assert discovery.channels[0].monitor.located
+    assert axes[0].monitor.located
     assert not discovery.wait(0.0)
-    discovery.take(second, 1)
+    take(second)
     let_it_answer()
     assert discovery.wait(0.0)
     assert container.state(1).position == 0.0

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import cosmic
 from cosmic.frame.verdict import Reason
-from cosmic.mico.core.collision.answer import AxisSpan
+from cosmic.mico.core.collision.checker import AxisSpan
 from cosmic.mico.core.motion.positioner import CountedTravel
 from unit.mico import rigs
 from unit.mico.rigs import mico, wait_until

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosmic.frame.verdict import ALLOWED, Reason, refuse
-from cosmic.mico.core.collision.answer import AxisSpan
-from cosmic.mico.core.collision.checker import NoCollisionModel
+from cosmic.mico.core.collision.checker import AxisSpan, NoCollisionModel
 from cosmic.mico.core.motion.checks import Limits, PlatformSnapshot, Request, check_move
 from cosmic.mico.core.motion.gate import Gate
 from cosmic.mico.core.motion.lease import Lease

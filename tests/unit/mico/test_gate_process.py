@@ -14,7 +14,7 @@ import pytest
 
 from cosmic.frame.clock import WALL
 from cosmic.mico.core.collision import helper_link
-from cosmic.mico.core.collision.answer import AxisSpan, Spans
+from cosmic.mico.core.collision.checker import AxisSpan, Spans
 from cosmic.mico.core.collision.helper_link import GateProcess, NoAnswerError
 from cosmic.mico.core.collision.model import SceneModel
 from unit.mico.gate_handlers import HANDLERS

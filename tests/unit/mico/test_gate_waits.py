@@ -10,8 +10,8 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.frame.network.lease import StationLease
 from cosmic.frame.verdict import ALLOWED, Reason, refuse
-from cosmic.mico.core.collision.answer import AxisSpan, SweepAnswer
-from cosmic.mico.core.collision.checker import CollisionChecker
+from cosmic.mico.core.collision.answer import SweepAnswer
+from cosmic.mico.core.collision.checker import AxisSpan, CollisionChecker
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.collision.helper_link import LateAnswerError
 from cosmic.mico.core.motion import gate as gate_module

@@ -12,7 +12,7 @@ from cosmic.frame.clock import WALL, RatedClock
 from cosmic.frame.errors import DeviceTimeout, NotConnectedError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.application import MicoApplication
-from cosmic.mico.core.mode import Mode
+from cosmic.mico.core.motion.manager import Mode
 from cosmic.mico.hw.interface import Channel
 from unit.mico.rigs import listen, mico, settings, wait_until
 from unit.mico.scripted_controller import ScriptedController

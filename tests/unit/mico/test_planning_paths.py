@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from cosmic.mico.core.collision.answer import AxisSpan
+from cosmic.mico.core.collision.checker import AxisSpan
 from cosmic.mico.core.collision.sweep import Sweep
 from cosmic.mico.core.planning.planner import plan_path
 from cosmic.mico.core.planning.problem import NoPath, Plan, Problem

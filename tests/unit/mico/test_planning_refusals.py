@@ -8,7 +8,8 @@ import pytest
 
 from cosmic.frame.errors import LimitError, MoveRefused, UnknownAxisError
 from cosmic.frame.verdict import Reason
-from cosmic.mico.core.collision.answer import AxisSpan, SweepAnswer
+from cosmic.mico.core.collision.answer import SweepAnswer
+from cosmic.mico.core.collision.checker import AxisSpan
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
 from cosmic.mico.core.planning.planner import plan_path

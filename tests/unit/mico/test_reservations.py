@@ -46,7 +46,8 @@ def test_the_gates_own_reservation_moves_the_axis_once():
         motion = MoveTo(5.0, "um")
         reservation = reserved(manager, motion)
         assert submit(manager, motion, reservation).wait(2) == 5.0
-        manager.order_together({NAME: MoveTo(0.0, "um")}, source="test")[NAME].movement.wait(2)
+        orders = manager.groups.order_together({NAME: MoveTo(0.0, "um")}, source="test")
+        orders[NAME].movement.wait(2)
         verdict = refused(submit(manager, motion, reservation))
         assert verdict.reason is Reason.NO_LEASE
         assert "used" in str(verdict)
@@ -146,7 +147,7 @@ def test_a_release_and_a_rescan_end_a_reservation():
 def test_orders_cannot_release_what_a_running_movement_holds():
     with platform(instant=False) as (manager, controller):
         motion = MoveTo(500.0, "um")
-        orders = manager.order_together({NAME: motion}, source="test")
+        orders = manager.groups.order_together({NAME: motion}, source="test")
         wait_until(lambda: bool(controller.of("move_to")))
         used = orders[NAME].reservation
         for reservation in (used, replace(used)):
@@ -186,7 +187,7 @@ def test_an_axis_that_moved_meanwhile_is_checked_again():
     with platform() as (manager, _):
         gate, motion = manager.gate, MoveTo(10.0, "um")
         late = reserved(manager, motion)
-        away = manager.order_together({NAME: MoveTo(1000.0, "um")}, source="test")
+        away = manager.groups.order_together({NAME: MoveTo(1000.0, "um")}, source="test")
         away[NAME].movement.wait(2)
         checked = []
         real = gate.decide_promptly

@@ -99,12 +99,12 @@ def felt(client: Client, *, looks: bool, receives: bool) -> list[float]:
     for _ in range(30):
         journey(client, 4)
         if looks:
-            side.force_un(np.array([client.clock.now_s()]))
+            side.timeline.force_un(np.array([client.clock.now_s()]))
         if receives:
             client.drain(2)
     journey(client, 1)  # and there the probe stays
     ends_s = client.clock.now_s() + np.linspace(-0.2, 0.0, 11)
-    return [float(each) for each in side.force_un(ends_s)]
+    return [float(each) for each in side.timeline.force_un(ends_s)]
 
 
 @pytest.mark.parametrize("receives", [False, True])
@@ -126,7 +126,7 @@ def test_movements_that_nobody_looks_at_do_not_pile_up(client: Client) -> None:
     for _ in range(300):  # a listener receives some forty times a second, moving or not
         journey(client, 2)
         client.drain(2)
-        piled.append(side.unseen)
+        piled.append(side.timeline.unseen)
     assert max(piled) < 250
     assert max(piled[150:]) <= 1.2 * max(piled[:150])
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from cosmic.mico.core.collision.answer import AxisSpan, Spans
+from cosmic.mico.core.collision.checker import AxisSpan, Spans
 from cosmic.mico.core.collision.sweep import Sweep
 from unit.mico.small_scenes import turntable, two_arms
 

@@ -6,7 +6,7 @@ from itertools import combinations
 
 from benchmarks.planning import SCENE
 
-from cosmic.mico.core.collision.answer import AxisSpan
+from cosmic.mico.core.collision.checker import AxisSpan
 from cosmic.mico.core.collision.scene_loader import load_scene
 from cosmic.mico.core.collision.sweep import Sweep
 

@@ -304,7 +304,7 @@ def test_the_failure_of_an_axis_that_waits_ends_the_others_before_they_are_ready
         rig["d1.c1"].move_to(3.0, wait=False)  # its device hangs in this call
         wait_until(lambda: len(controller.of("move_to")) == 1)
         motions = {LEFT: MoveTo(1.0, "um"), RIGHT: MoveTo(1.0, "um")}
-        orders = manager.order_together(motions, source="test")
+        orders = manager.groups.order_together(motions, source="test")
         wait_until(lambda: rig[LEFT].details.in_motion)
         manager.device(LEFT).halt(manager.address(LEFT).channel, "halted")
         wait_until(lambda: orders[LEFT].movement.done)
@@ -335,7 +335,7 @@ def test_an_axis_started_for_another_thread_stops_at_once_when_a_stop_overtook_i
         controller.move_to, controller.ask_position = send, ask
         rig["d1.c1"].move_to(3.0, wait=False)
         motions = {LEFT: MoveTo(1.0, "um"), RIGHT: MoveTo(1.0, "um")}
-        orders = manager.order_together(motions, source="test")
+        orders = manager.groups.order_together(motions, source="test")
         wait_until(lambda: rig[LEFT].details.in_motion)
         hangs.set()
         wait_until(lambda: ("hangs",) in controller.calls)

@@ -101,11 +101,11 @@ class Bench:
 
     @property
     def moment(self) -> Moment:
-        return self.force_side.moment(self.now_s)
+        return self.force_side.timeline.moment(self.now_s)
 
     @property
     def force_un(self) -> float:
-        return float(self.force_side.force_un(np.array([self.now_s]))[0])
+        return float(self.force_side.timeline.force_un(np.array([self.now_s]))[0])
 
     @property
     def push(self) -> Push:

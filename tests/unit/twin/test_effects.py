@@ -171,7 +171,7 @@ def test_a_dwell_shows_the_relaxation_of_each_decade() -> None:
     begin_s = bench.now_s
     bench.wait(120.0)
     times = begin_s + np.array([1.0, 10.0, 100.0])
-    one, ten, hundred = bench.force_side.force_un(times)
+    one, ten, hundred = bench.force_side.timeline.force_un(times)
     assert ten / one == pytest.approx(0.955, abs=0.012)
     assert hundred / ten == pytest.approx(0.955, abs=0.012)
 
@@ -297,7 +297,7 @@ def test_a_charged_fibre_jumps_to_the_probe() -> None:
         bench = Bench(with_fibre(charge_uc_m2=charge))
         bench.go(left_x=3600.0).go(left_z=-810.0).go(probe_y=-4975.0)
         end_s = bench.start({"probe.y": -4985.2}, 2.0)
-        return float(bench.force_side.force_un(np.arange(bench.now_s, end_s, 0.002)).min())
+        return float(bench.force_side.timeline.force_un(np.arange(bench.now_s, end_s, 0.002)).min())
 
     assert pull_before_contact(0.0) == 0.0
     assert pull_before_contact(2.0) < -0.1
@@ -309,7 +309,7 @@ def test_a_charged_ribbon_on_edge_is_pushed_though_its_jump_does_not_hold() -> N
     for step in range(8):
         bench.go(probe_y=-4975.0 - 2.5 * step)
     end_s = bench.start({"probe.y": -4995.0}, 2.0)
-    assert bench.force_side.force_un(np.array([bench.now_s, end_s]))[-1] > 5.0
+    assert bench.force_side.timeline.force_un(np.array([bench.now_s, end_s]))[-1] > 5.0
 
 
 def test_a_fibre_that_sticks_more_than_it_is_held_stays_on_the_plate() -> None:

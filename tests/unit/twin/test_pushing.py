@@ -62,7 +62,7 @@ def test_the_probe_does_not_tunnel_at_any_speed(speed: float) -> None:
     bench = before_the_fibre(Bench())
     end_s = bench.start({"probe.y": touching_y(bench) - 60.0}, speed)
     times = np.arange(bench.now_s, end_s + 0.01, 1e-4)
-    force = bench.force_side.force_un(times)
+    force = bench.force_side.timeline.force_un(times)
     bench.now_s = end_s + 0.01
     assert bench.push.deflection_um == pytest.approx(60.0, rel=0.01)
     assert (np.diff(force) > -1e-9).all(), "it only rises"
@@ -209,7 +209,7 @@ def test_the_past_is_the_same_whether_it_is_looked_at_often_or_late() -> None:
     late, often = Bench(), Bench()
     campaign(late)
     times = np.arange(late.now_s - 1.0, late.now_s, 1.0 / 15_000.0)
-    seen_late = late.force_side.force_un(times)
+    seen_late = late.force_side.timeline.force_un(times)
 
     parts, ends = [], iter(times)
     assert next(ends) == times[0]
@@ -217,13 +217,13 @@ def test_the_past_is_the_same_whether_it_is_looked_at_often_or_late() -> None:
 
     def go_and_look(speed: float = 2000.0, **target: float) -> Bench:
         real_go(speed, **target)
-        often.force_side.force_un(np.array([often.now_s]))
+        often.force_side.timeline.force_un(np.array([often.now_s]))
         return often
 
     often.go = go_and_look  # type: ignore[method-assign]
     campaign(often)
     for start in range(0, times.size, 75):
-        parts.append(often.force_side.force_un(times[start : start + 75]))
+        parts.append(often.force_side.timeline.force_un(times[start : start + 75]))
     assert np.concatenate(parts) == pytest.approx(seen_late, abs=0.3)
     assert seen_late.max() > 80.0
 
@@ -233,7 +233,7 @@ def test_a_minute_at_rest_costs_a_few_looks() -> None:
     force = bench.force_un
     bench.wait(60.0)
     times = np.linspace(bench.now_s - 60.0, bench.now_s, 600)
-    assert bench.force_side.force_un(times) == pytest.approx(force, rel=1e-3)
+    assert bench.force_side.timeline.force_un(times) == pytest.approx(force, rel=1e-3)
 
 
 def test_a_long_journey_that_nobody_watched_ends_where_it_should() -> None:
@@ -243,4 +243,4 @@ def test_a_long_journey_that_nobody_watched_ends_where_it_should() -> None:
 
 
 def test_no_times_give_no_forces() -> None:
-    assert Bench().force_side.force_un(np.empty(0)).shape == (0,)
+    assert Bench().force_side.timeline.force_un(np.empty(0)).shape == (0,)

@@ -120,9 +120,9 @@ def test_another_plate_has_other_fibres_and_the_same_standard(tmp_path: Path) ->
     path = tmp_path / "truth.jsonl"
     first = scene(TruthFile(path))
     assert first.force_side is not None
-    before = first.force_side.moment(0.0).fibres
+    before = first.force_side.timeline.moment(0.0).fibres
     assert first.change_plate() == 1
-    after = first.force_side.moment(0.0).fibres
+    after = first.force_side.timeline.moment(0.0).fibres
     assert len(after) == len(before) and not {e.number for e in before} & {e.number for e in after}
     assert {each.where for each in after} == {"plate"}
     assert before[-1].settings == after[-1].settings, "the standard"

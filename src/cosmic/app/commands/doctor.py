@@ -9,11 +9,11 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from cosmic import __version__
 from cosmic.app.configuration.platform_file import PlatformFile, load_platform
 from cosmic.app.diagnosis import computer
 from cosmic.app.diagnosis.finding import Check, Finding, State, carry_out
 from cosmic.app.diagnosis.hardware import brought, hardware, network, serial_ports
+from cosmic.frame.version import __version__
 
 _MARKS: Final = {State.GOOD: "ok", State.NOTE: "--", State.PROBLEM: "!!"}
 _WIDTH: Final = 100

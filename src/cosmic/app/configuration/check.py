@@ -20,7 +20,8 @@ from cosmic.frame.config import load_model, not_there, read_toml
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.plugins import Kind, has_twin, is_simulated, missing_packages, read_options
 from cosmic.frame.units import format_quantity
-from cosmic.mico.core.settings import MicoSettings, PositionerSettings
+from cosmic.mico.core.motion.settings import PositionerSettings
+from cosmic.mico.core.settings import MicoSettings
 from cosmic.twin.settings import StageKind, TwinSettings
 
 

@@ -14,12 +14,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
-from cosmic import __version__
 from cosmic.app.diagnosis.finding import Finding, State
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.file_names import check_directory, space_left
 from cosmic.frame.platform_services import tick_finely
+from cosmic.frame.version import __version__
 
 NEWEST_TESTED: Final = (3, 13)
 _WAIT_S: Final = 0.002

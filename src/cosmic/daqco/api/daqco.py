@@ -44,8 +44,7 @@ from cosmic.frame.declaration import Companion, Declared, command, newest, state
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable, RecordingError
 from cosmic.frame.file_names import NameOption, directory_problem, space_left
 from cosmic.frame.network.application import remote_api
-from cosmic.frame.network.caller import called_remotely, current_call
-from cosmic.frame.network.dead_man import DeadMan
+from cosmic.frame.network.caller import called_remotely, caller_dead_man
 from cosmic.frame.network.transport import Rule
 from cosmic.frame.operation import Task
 from cosmic.frame.weakly import weakly
@@ -708,12 +707,12 @@ class Daqco(Declared):
         DeviceError
             The board is gone or refused.
         """
-        self._application.outputs.set_voltage(name, volts, _dead_man())
+        self._application.outputs.set_voltage(name, volts, caller_dead_man())
 
     @command(moves=True)
     def set_line(self, name: str, *, high: bool) -> None:
         """Set a digital line; raises as `set_output`."""
-        self._application.outputs.set_line(name, high=high, dead_man=_dead_man())
+        self._application.outputs.set_line(name, high=high, dead_man=caller_dead_man())
 
     @command(moves=True, timeout_s=SLOW_S)
     def play(
@@ -743,7 +742,7 @@ class Daqco(Declared):
             As `set_output`.
         """
         waveform = Waveform(volts, rate_hz, repeat, trigger)
-        return self._application.outputs.play(name, waveform, _dead_man())
+        return self._application.outputs.play(name, waveform, caller_dead_man())
 
     @command(at_once=True)
     def stop_outputs(self, reason: str = "stop of the outputs") -> None:
@@ -764,11 +763,6 @@ class Daqco(Declared):
             MiCo is stopped: reset that stop.
         """
         self._application.reset_outputs()
-
-
-def _dead_man() -> DeadMan | None:
-    call = current_call()
-    return call.dead_man if call is not None else None
 
 
 def daqco_of(application: CosmicApplicationBase) -> Daqco:

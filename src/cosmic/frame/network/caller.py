@@ -75,12 +75,36 @@ class Call:
     overtaken: Callable[[tuple[str, ...]], bool] = _never
 
 
+_LONGEST: Final = 120
 _current: Final[ContextVar[Call | None]] = ContextVar("cosmic_call", default=None)
 
 
 def current_call() -> Call | None:
     """Return the call that this thread carries out; None when no station carries it out."""
     return _current.get()
+
+
+def one_line(text: str) -> str:
+    """Return `text` as it may stand in a log: short, and in one line."""
+    return "".join(each if each.isprintable() else " " for each in text[:_LONGEST])
+
+
+def source_of(source: str) -> str:
+    """Return who commands, for the log: `source` here, the name of a client before it."""
+    call = current_call()
+    return source if call is None else f"{call.caller.name} {one_line(source)}".strip()
+
+
+def caller_token() -> str:
+    """Return the token of the client whose call this thread carries out; empty for none."""
+    call = current_call()
+    return "" if call is None else call.caller.token
+
+
+def caller_dead_man() -> DeadMan | None:
+    """Return the dead man of the call that this thread carries out; None where it has none."""
+    call = current_call()
+    return None if call is None else call.dead_man
 
 
 def called_remotely() -> bool:

@@ -21,9 +21,9 @@ from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.collision.model import SceneModel
-from cosmic.mico.core.mode import Mode
-from cosmic.mico.core.motion.manager import DeviceManager
-from cosmic.mico.core.motion.undo import Cautions, ClosedGrippers, UndoHistory
+from cosmic.mico.core.motion.cautions import Cautions, ClosedGrippers
+from cosmic.mico.core.motion.manager import DeviceManager, Mode
+from cosmic.mico.core.motion.undo import UndoHistory
 from cosmic.mico.core.path_planner import PathPlanner
 from cosmic.mico.core.sequence.report import SequenceReport
 from cosmic.mico.core.settings import MicoSettings
@@ -66,7 +66,7 @@ class MicoApplication(MicoApplicationBase):
             PathPlanner(self.manager, self.collision.model) if self.collision is not None else None
         )
         self.cautions = Cautions()
-        self._grippers = ClosedGrippers(self.manager)
+        self._grippers = ClosedGrippers(self.manager.state_changed)
         self.cautions.add(self._grippers.doubt)
         self.undo = UndoHistory(self.manager, self.cautions)
         self.trajectories = TrajectorySite(self, policy, platform, folder)

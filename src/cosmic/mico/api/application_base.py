@@ -18,7 +18,7 @@ from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.api.trajectory_recording import Recordings
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.model import SceneModel
-from cosmic.mico.core.motion.undo import Cautions
+from cosmic.mico.core.motion.cautions import Cautions
 from cosmic.mico.core.sequence.report import SequenceReport
 from cosmic.mico.core.teleoperation.teleoperation import SteeredPlatform, Teleoperation
 

@@ -21,20 +21,13 @@ from cosmic.frame.errors import (
 )
 from cosmic.frame.events import notify
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.network.caller import JOG_LIMIT_S, MOVE_LIMIT_S
+from cosmic.frame.network.caller import JOG_LIMIT_S, MOVE_LIMIT_S, one_line, source_of
 from cosmic.frame.operation import wait_or_cancel
 from cosmic.frame.threads import may_wait_here
 from cosmic.frame.units import AxisUnit
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.api.axis_numbers import Number, as_number, as_whole, finite
 from cosmic.mico.api.axis_orders import AxisOrders
-from cosmic.mico.api.entry import (
-    Number,
-    as_number,
-    as_whole,
-    finite,
-    one_line,
-    source_of,
-)
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.news import SentMotion
 from cosmic.mico.api.plan_movable import PlanMovable
@@ -55,7 +48,8 @@ from cosmic.mico.core.motion.orders import (
     ToEndStop,
 )
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState, Status, class_for
-from cosmic.mico.core.settings import MicoSettings, PositionerSettings
+from cosmic.mico.core.motion.settings import PositionerSettings
+from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 
 
@@ -323,7 +317,7 @@ class Axis(PlanMovable, Declared):
             return exc.verdict
         motion = MoveTo(target, self.unit)
         if self._far is None:
-            return self._manager.check({self._name: motion}, consent=consent)
+            return self._manager.groups.check({self._name: motion}, consent=consent)
         if not may_wait_here():
             return self._far.foresee({self._name: motion}, consent)
         try:
@@ -336,7 +330,7 @@ class Axis(PlanMovable, Declared):
     @command
     def check_motion(self, motion: SentMotion, *, consent: bool = False) -> MoveVerdict:
         """Return the gate's answer to a motion in gate coordinates, without moving."""
-        return self._manager.check({self._name: motion}, consent=consent)
+        return self._manager.groups.check({self._name: motion}, consent=consent)
 
     # Moving
 

@@ -9,8 +9,8 @@ from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable, refusal
 from cosmic.frame.plan_shape import DataKeys, Readings, plain_name
 from cosmic.frame.verdict import MoveVerdict
-from cosmic.mico.api.entry import Number
-from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.axis_numbers import Number
+from cosmic.mico.api.group_movement import GroupMovement
 from cosmic.mico.api.move_status import MoveStatus, refused
 from cosmic.mico.api.plan_movable import PlanMovable
 

@@ -5,9 +5,9 @@ from threading import Lock
 from typing import Final
 
 from cosmic.frame.errors import CosmicError, MoveCancelled
-from cosmic.frame.network.caller import current_call
-from cosmic.mico.api.entry import caller_token, finite, source_of
-from cosmic.mico.api.group import GroupMovement, LinkedMovement
+from cosmic.frame.network.caller import caller_token, current_call, source_of
+from cosmic.mico.api.axis_numbers import finite
+from cosmic.mico.api.group_movement import GroupMovement, LinkedMovement
 from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.messages import Order
@@ -54,7 +54,7 @@ class AxisOrders:
         whole = LinkedMovement(self._name)
         before = follows.parts if isinstance(follows, LinkedMovement) else None
         try:
-            orders = self._manager.order_together(
+            orders = self._manager.groups.order_together(
                 {self._name: motion},
                 source=source_of(source or self._commander.source),
                 consent=consent,

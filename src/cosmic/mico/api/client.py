@@ -22,7 +22,7 @@ from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.model import SceneModel
-from cosmic.mico.core.motion.undo import Cautions
+from cosmic.mico.core.motion.cautions import Cautions
 from cosmic.mico.core.sequence.report import SequenceReport
 
 FIRST_WORD_S: Final = 10.0

@@ -16,7 +16,7 @@ from cosmic.frame.errors import (
 )
 from cosmic.frame.operation import Task
 from cosmic.frame.verdict import Reason, refuse
-from cosmic.mico.api.group import move_together
+from cosmic.mico.api.group_movement import move_together
 from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.positioner import Confidence
 from cosmic.mico.core.sequence.plan import PlannedStep, plan_sequence

@@ -23,7 +23,7 @@ from cosmic.frame.errors import (
     UnknownAxisError,
 )
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.network.caller import current_call
+from cosmic.frame.network.caller import current_call, one_line, source_of
 from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.transport import Rule
 from cosmic.frame.operation import Operation, Progress, Task, wait_or_cancel
@@ -35,12 +35,11 @@ from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.api.application_base import PATH_BUDGET_S, MicoApplicationBase
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.axis_group import AxisGroup
-from cosmic.mico.api.collision import Collision
+from cosmic.mico.api.axis_numbers import Number, as_number
+from cosmic.mico.api.collision import Collision, LiveClearance
 from cosmic.mico.api.companion import MicoCompanion
-from cosmic.mico.api.entry import Number, as_number, one_line, source_of
-from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.group_movement import GroupMovement
 from cosmic.mico.api.initialisation import Confirm
-from cosmic.mico.api.live_clearance import LiveClearance
 from cosmic.mico.api.news import (
     AxisBegun,
     AxisEnded,
@@ -72,7 +71,7 @@ from cosmic.mico.core.sequence.report import SequenceReport
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 from cosmic.mico.core.trajectory.binding import AxisFacts, PlatformFacts
-from cosmic.mico.core.trajectory_recorder import Recorded
+from cosmic.mico.core.trajectory.recorder import Recorded
 from cosmic.mico.hw.interface import PositionerKind
 
 SCENE_LIMIT_S: Final = 10.0
@@ -521,7 +520,7 @@ class Mico(Declared):
             stopped = GroupMovement.followed(f"the movement of {', '.join(motions)}")
             stopped.fail(MoveCancelled(f"{', '.join(motions)}: halted before they started"))
             return stopped
-        orders = self._manager.order_together(
+        orders = self._manager.groups.order_together(
             motions,
             source=source_of(source),
             consent=consent,
@@ -578,7 +577,7 @@ class Mico(Declared):
         self, motions: dict[str, SentMotion], *, consent: bool = False
     ) -> MoveVerdict:
         """Return the gate's answer to motions in gate coordinates, without moving."""
-        return self._manager.check(motions, consent=consent)
+        return self._manager.groups.check(motions, consent=consent)
 
     def _foreseen(self, motions: Mapping[str, Motion], consent: bool) -> MoveVerdict:
         reason = self.stop_state.reason

@@ -3,7 +3,7 @@
 from typing_extensions import override
 
 from cosmic.frame.plan_shape import PlanStatus
-from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.group_movement import GroupMovement
 from cosmic.mico.core.motion.movement import Movement
 
 

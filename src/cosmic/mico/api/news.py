@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from threading import Lock
 from typing import Final
 
-from PySide6.QtCore import QMetaObject, QObject, Qt
+from PySide6.QtCore import QObject, Qt, SignalInstance
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
@@ -26,7 +26,7 @@ from cosmic.mico.core.motion.orders import (
     ToEndStop,
 )
 from cosmic.mico.core.motion.positioner import PositionerState, class_for, positions_of
-from cosmic.mico.core.trajectory_recorder import (
+from cosmic.mico.core.trajectory.recorder import (
     RecordedBegin,
     RecordedEnd,
     resting_of,
@@ -147,38 +147,19 @@ MovementNews = AxisRefused | AxisBegun | AxisEnded | AxesStarted
 _DIRECT: Final = Qt.ConnectionType.DirectConnection
 
 
-class DeviceFeed:
-    """Listens to signals of all devices there are, also of those that come later; any thread."""
+def _listen(*pairs: tuple[SignalInstance, Callable[..., object]]) -> Callable[[], None]:
+    """Call a function at each signal, in its thread; return what ends that."""
+    connections = [signal.connect(slot, _DIRECT) for signal, slot in pairs]
+    lock = Lock()
 
-    def __init__(self, manager: DeviceManager, slots: Mapping[str, Callable[..., object]]) -> None:
-        self._manager = manager
-        self._slots = slots
-        self._lock = Lock()
-        self._joined: dict[int, object] = {}
-        self._connections: list[QMetaObject.Connection] = []
-        self.join(manager, "changed", self._join_devices)
-        self._join_devices()
-
-    def join(self, sender: QObject, signal: str, slot: Callable[..., object]) -> None:
-        """Listen to a signal of something else as well."""
-        with self._lock:
-            self._connections.append(getattr(sender, signal).connect(slot, _DIRECT))
-
-    def _join_devices(self) -> None:
-        for index, device in self._manager.devices.items():
-            with self._lock:
-                new = self._joined.get(index) is not device
-                self._joined[index] = device
-            for signal, slot in self._slots.items() if new else ():
-                self.join(device, signal, slot)
-
-    def close(self) -> None:
-        """Listen no more."""
-        with self._lock:
-            connections, self._connections = self._connections, []
-            self._joined.clear()
-        for each in connections:
+    def end() -> None:
+        with lock:
+            ended = connections.copy()
+            connections.clear()
+        for each in ended:
             QObject.disconnect(each)
+
+    return end
 
 
 def follow_movements(
@@ -220,17 +201,13 @@ def follow_movements(
     def on_group_started(started: GroupStarted) -> None:
         receiver(AxesStarted(started.names, started.skew_ms))
 
-    feed = DeviceFeed(
-        manager,
-        {
-            "movement_begun": on_begun,
-            "movement_ended": on_ended,
-            "movement_refused": on_refused,
-        },
+    return _listen(
+        (manager.movement_begun, on_begun),
+        (manager.movement_ended, on_ended),
+        (manager.movement_refused, on_refused),
+        (manager.group_refused, on_group_refused),
+        (manager.group_started, on_group_started),
     )
-    feed.join(manager, "group_refused", on_group_refused)
-    feed.join(manager, "group_started", on_group_started)
-    return feed.close
 
 
 def _own_frequency_hz(manager: DeviceManager, state: PositionerState) -> int | None:
@@ -267,4 +244,4 @@ def follow_positions(
                 )
             )
 
-    return DeviceFeed(manager, {"position_changed": on_position}).close
+    return _listen((manager.position_changed, on_position))

@@ -24,7 +24,7 @@ from cosmic.frame.plan_shape import (
 )
 from cosmic.frame.plan_signal import PlanSignal
 from cosmic.frame.verdict import MoveVerdict
-from cosmic.mico.api.entry import Number, as_number, as_whole
+from cosmic.mico.api.axis_numbers import Number, as_number, as_whole
 from cosmic.mico.api.move_status import MoveStatus, refused
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.positioner import PositionerState

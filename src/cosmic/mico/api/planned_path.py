@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.frame.operation import Task
 from cosmic.frame.renamed import renamed_in
-from cosmic.mico.api.group import move_together
+from cosmic.mico.api.group_movement import move_together
 from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.orders import Motion, MoveTo
 from cosmic.mico.core.planning.problem import Plan

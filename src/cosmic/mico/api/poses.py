@@ -9,10 +9,10 @@ from cosmic.frame.arguments import checked_class
 from cosmic.frame.declaration import Declared, command, state
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable, UnknownAxisError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.caller import source_of
 from cosmic.frame.operation import Task, wait_or_cancel
 from cosmic.frame.renamed import renamed_parameters
-from cosmic.mico.api.entry import source_of
-from cosmic.mico.api.group import move_together
+from cosmic.mico.api.group_movement import move_together
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.core.motion.orders import Motion, MoveTo
 from cosmic.mico.core.motion.positioner import Confidence

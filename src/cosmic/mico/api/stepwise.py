@@ -8,7 +8,7 @@ from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable, refusal
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.api.entry import Number, as_number
+from cosmic.mico.api.axis_numbers import Number, as_number
 from cosmic.mico.core.motion.movement import Movement
 
 logger = logging.getLogger(__name__)

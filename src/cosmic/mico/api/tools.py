@@ -12,7 +12,7 @@ from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable, UnknownToolError, refusal
 from cosmic.frame.operation import wait_or_cancel
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
-from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.group_movement import GroupMovement
 from cosmic.mico.api.news import SentMotion
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.collision.tool_frames import (

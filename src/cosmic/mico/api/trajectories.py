@@ -15,23 +15,23 @@ from cosmic.frame.declaration import Declared, command, part
 from cosmic.frame.errors import DeviceTimeout, NotAvailable, RecordingError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.kept_file import write_whole
+from cosmic.frame.network.caller import caller_token, source_of
 from cosmic.frame.network.transfer import transferable
 from cosmic.frame.operation import Operation, Progress
 from cosmic.frame.weakly import weakly
-from cosmic.mico.api.entry import caller_token, source_of
 from cosmic.mico.api.trajectory_player import SPEEDS, Players, TrajectoryPlayer, text_of
 from cosmic.mico.api.trajectory_recording import Recordings, TrajectoryRecording
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.trajectory_state import PlayProgress, StartMode
 from cosmic.mico.core.poses import Pose
 from cosmic.mico.core.settings import MicoSettings
-from cosmic.mico.core.trajectory import parser
+from cosmic.mico.core.trajectory import reader
 from cosmic.mico.core.trajectory.binding import Bound, PlatformFacts, bind
 from cosmic.mico.core.trajectory.mirror import mirrored
 from cosmic.mico.core.trajectory.model import Problem, Trajectory
+from cosmic.mico.core.trajectory.recorder import Recordable
 from cosmic.mico.core.trajectory.rehearsal import Rehearsal
 from cosmic.mico.core.trajectory.writer import to_text
-from cosmic.mico.core.trajectory_recorder import Recordable
 
 transferable(Problem)  # a `TrajectoryError` lists them
 
@@ -187,13 +187,13 @@ class Trajectories(Declared):
         TrajectoryError
             Something is wrong; names each line.
         """
-        trajectory = parser.load(Path(path), progress, cut_off=cut_off)
+        trajectory = reader.load(Path(path), progress, cut_off=cut_off)
         self.check(trajectory)
         return trajectory
 
     def parse(self, text: str) -> Trajectory:
         """Read a trajectory from a text and check it; raises `TrajectoryError`."""
-        trajectory = parser.parse(text)
+        trajectory = reader.parse(text)
         self.check(trajectory)
         return trajectory
 
@@ -224,7 +224,7 @@ class Trajectories(Declared):
         TrajectoryError
             An axis has no counterpart, or the mirrored positions are outside its limits.
         """
-        found = parser.parse(
+        found = reader.parse(
             to_text(mirrored(trajectory, self._platform.settings.mirror)),
             name=trajectory.name,
         )
@@ -296,7 +296,7 @@ class Trajectories(Declared):
         whose = caller_token(), key
         with self._lock:
             whole = self._texts.get(whose, "") + text
-            if len(whole) > parser.LARGEST_BYTES:
+            if len(whole) > reader.LARGEST_BYTES:
                 self._texts.pop(whose, None)
                 raise NotAvailable("the trajectory is longer than any file may be; split it")
             self._texts[whose] = whole
@@ -315,7 +315,7 @@ class Trajectories(Declared):
             text = self._texts.pop((caller_token(), given), None)
         if text is None:
             raise NotAvailable("the text of the trajectory did not come; try again")
-        return parser.parse(text, path=path, cut_off=True)
+        return reader.parse(text, path=path, cut_off=True)
 
     def _bound(self, trajectory: Trajectory) -> Bound:
         axes = trajectory.axes

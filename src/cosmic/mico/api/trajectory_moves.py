@@ -6,7 +6,7 @@ from threading import Lock
 
 from cosmic.frame.errors import CosmicError, DeviceError, MoveCancelled, MoveRefused, refusal
 from cosmic.frame.operation import Task
-from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.group_movement import GroupMovement
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.trajectory_start import AwayFromStartError
 from cosmic.mico.core.motion.orders import Motion, MoveTo, Step
@@ -79,7 +79,7 @@ class LegMover:
         """Start movements together and wait for all; the failure of one stops the others."""
         if task.cancel_requested:
             raise MoveCancelled("cancelled")
-        orders = self._manager.order_together(motions, source=self._source)
+        orders = self._manager.groups.order_together(motions, source=self._source)
         group = GroupMovement({name: order.movement for name, order in orders.items()})
         with self._guard:
             self._group = group
@@ -103,7 +103,7 @@ class LegMover:
         return error
 
     def _set_frequency(self, axis: str, speed: float) -> None:
-        usual = self._usual.setdefault(axis, self._site.frequency_hz(axis))
+        usual = self._usual.setdefault(axis, self._site.manager.usual_frequency_hz(axis))
         within_hz = self._manager.state(axis).frequency_range_hz
         hertz = scaled_hz(self._wanted.get(axis) or usual, speed, within_hz)
         if hertz != self._sent.get(axis, usual):

@@ -37,7 +37,7 @@ from cosmic.mico.api.trajectory_state import (
     StartMode,
     present_mode,
 )
-from cosmic.mico.core.trajectory import parser
+from cosmic.mico.core.trajectory import reader
 from cosmic.mico.core.trajectory.binding import Bound
 from cosmic.mico.core.trajectory.model import Trajectory, TrajectoryError
 from cosmic.mico.core.trajectory.rehearsal import Rehearsal
@@ -143,7 +143,7 @@ class TrajectoryPlayer(Declared):
     def trajectory(self) -> Trajectory:
         """What it plays."""
         if self._trajectory is None:  # somebody else had it prepared
-            self._trajectory = parser.parse(self.text())
+            self._trajectory = reader.parse(self.text())
         return self._trajectory
 
     def keep_trajectory(self, trajectory: Trajectory) -> None:
@@ -450,7 +450,7 @@ def text_of(trajectory: Trajectory) -> str:
     text = "\n".join([*trajectory.lines, ""])
     if trajectory.lines:
         try:
-            same = parser.parse(text, cut_off=True).statements == trajectory.statements
+            same = reader.parse(text, cut_off=True).statements == trajectory.statements
         except TrajectoryError:
             same = False
         if same:

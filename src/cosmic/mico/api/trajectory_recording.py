@@ -15,7 +15,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.core.poses import Pose
 from cosmic.mico.core.trajectory.model import Trajectory
 from cosmic.mico.core.trajectory.reader import head_problem
-from cosmic.mico.core.trajectory_recorder import Recordable, TrajectoryRecorder
+from cosmic.mico.core.trajectory.recorder import Recordable, TrajectoryRecorder
 
 
 @checked_class

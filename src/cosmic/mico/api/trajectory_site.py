@@ -94,13 +94,6 @@ class TrajectorySite:
             if state.position is not None and state.confidence is Confidence.KNOWN
         }
 
-    def frequency_hz(self, axis: str) -> int:
-        """Return the closed-loop frequency limit of an axis."""
-        channel = self.manager.address(axis).channel
-        positioner = self.manager.device(axis).container.positioner(channel)
-        own = positioner.frequency_hz if positioner is not None else None
-        return own or self.manager.settings.defaults.closed_loop_frequency_hz
-
     def step_um(self, axis: str) -> float:
         """Return how far a step of an axis without sensor is taken to go."""
         for each in self.manager.settings.positioner:
@@ -124,7 +117,9 @@ class TrajectorySite:
             setup = RehearsalSetup(
                 states=states,
                 facts=self.facts(),
-                frequencies_hz={name: float(self.frequency_hz(name)) for name in states},
+                frequencies_hz={
+                    name: float(self.manager.usual_frequency_hz(name)) for name in states
+                },
                 step_um={name: self.step_um(name) for name in states},
                 checker=checker,
                 rules=Limits.of(self.manager.settings),

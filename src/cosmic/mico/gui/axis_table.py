@@ -21,7 +21,7 @@ from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State
 from cosmic.mico.core.motion.orders import LARGEST_STEPS
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
-from cosmic.mico.core.settings import MotionDefaults
+from cosmic.mico.core.motion.settings import MotionDefaults
 from cosmic.mico.gui.card import CONFIDENCE, PositionDisplay
 from cosmic.mico.gui.detour_request import Goal
 from cosmic.mico.gui.move_row import StepField

@@ -20,7 +20,7 @@ from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
 from cosmic.frame.operation import Progress, Task
 from cosmic.mico.core.motion.orders import FREQUENCY_HZ
-from cosmic.mico.core.settings import JogSettings
+from cosmic.mico.core.motion.settings import JogSettings
 from cosmic.mico.hw.interface import PositionerKind
 
 _POLL_MS: Final = 150

@@ -17,7 +17,8 @@ from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.mico.api.news import AxesStarted, MovementNews
 from cosmic.mico.core.motion.links import Link
-from cosmic.mico.core.settings import GroupSettings, MicoSettings, PositionerSettings
+from cosmic.mico.core.motion.settings import PositionerSettings
+from cosmic.mico.core.settings import GroupSettings, MicoSettings
 from cosmic.mico.gui.axis_commands import ConsentRequest
 from cosmic.mico.gui.axis_table import AxisTable
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI

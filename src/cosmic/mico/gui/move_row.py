@@ -10,7 +10,7 @@ from cosmic.frame.overrides import override
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.settings import MotionDefaults
+from cosmic.mico.core.motion.settings import MotionDefaults
 from cosmic.mico.gui.detour_request import Goal
 
 

@@ -16,7 +16,7 @@ from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look, ui_f
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState, Status
-from cosmic.mico.core.settings import MotionDefaults, PositionerSettings
+from cosmic.mico.core.motion.settings import MotionDefaults, PositionerSettings
 from cosmic.mico.gui.axis_commands import AxisCommands
 from cosmic.mico.gui.card import Card, ConfidenceMark, PositionDisplay
 from cosmic.mico.gui.collision_switch import UNWATCHED_TEXT, CollisionSwitch

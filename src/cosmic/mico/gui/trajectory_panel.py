@@ -24,7 +24,7 @@ from cosmic.mico.api.trajectory_player import TrajectoryPlayer
 from cosmic.mico.api.trajectory_recording import TrajectoryRecording
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
 from cosmic.mico.core.trajectory.model import SUFFIX, Problem, Trajectory, TrajectoryError
-from cosmic.mico.core.trajectory.parser import LARGEST_BYTES
+from cosmic.mico.core.trajectory.reader import LARGEST_BYTES
 from cosmic.mico.core.trajectory.rehearsal import Rehearsal
 from cosmic.mico.gui.poses_box import PosesBox
 from cosmic.mico.gui.trajectory_bars import RecordBar, RunBar, StartQuestion

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import State
-from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.group_movement import GroupMovement
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.motion.undo import UndoEntry, undo_text
 from cosmic.mico.gui.consent_dialogs import CautionDialog

@@ -118,7 +118,7 @@ class Subjects:
     def at(self, at_s: float) -> Subject:
         """Return what is to be seen at `at_s`, not later than now and some seconds ago at most."""
         values = self._force_side.positions(at_s)
-        moment = self._force_side.moment(at_s)
+        moment = self._force_side.timeline.moment(at_s)
         plate = self._force_side.skeleton.pose(self._settings.geometry.plate, values)
         lying = tuple(each for each in moment.fibres if each.where == "plate")
         carried = tuple(each for each in moment.fibres if each.anchor)

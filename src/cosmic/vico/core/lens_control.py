@@ -14,7 +14,7 @@ from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.heartbeat import OPEN_S, Heartbeat
-from cosmic.frame.network.caller import current_call
+from cosmic.frame.network.caller import caller_dead_man
 from cosmic.frame.operation import Task
 from cosmic.frame.threads import WorkerThread
 from cosmic.vico.core.lens_history import LensHistory
@@ -192,8 +192,7 @@ class PeripheralThread(WorkerThread):
             order.task.fail(MoveCancelled("aborted before it started"))
 
     def _move(self, title: str, targets: Mapping[LensAxis, int | None]) -> Task:
-        call = current_call()
-        dead_man = call.dead_man if call is not None else None
+        dead_man = caller_dead_man()
 
         def carry_out(task: Task) -> None:
             self._lens.begin(Move(task, targets, self._clock, self._timeout_s, dead_man))

@@ -24,10 +24,9 @@ from cosmic.vico.gui.camera_chooser import CameraChooser
 from cosmic.vico.gui.chain_panel import ChainPanel
 from cosmic.vico.gui.contrast_panel import ContrastPanel
 from cosmic.vico.gui.correct_button import CorrectButton
-from cosmic.vico.gui.ghost_layer import GhostLayer
 from cosmic.vico.gui.image_tools import ImageTools
 from cosmic.vico.gui.image_view import CameraImageView
-from cosmic.vico.gui.layers import CornerText, Crosshair, Note, ScaleBar
+from cosmic.vico.gui.layers import CornerText, Crosshair, GhostLayer, Note, ScaleBar
 from cosmic.vico.gui.levels import Histogram, histogram
 from cosmic.vico.gui.mark_layer import MarkLayer
 from cosmic.vico.gui.record_bar import RecordBar
@@ -219,8 +218,8 @@ class CameraView(QWidget):
             (row.found, self.seen),
         ):
             button.toggled.connect(_shower(layer, view))
-        self.contrast.levels_changed.connect(view.set_levels)
-        self.contrast.marks_changed.connect(view.set_marks)
+        self.contrast.levels_changed.connect(view.pixels.set_levels)
+        self.contrast.marks_changed.connect(view.pixels.set_marks)
         view.pointed.connect(self._on_pointed)
         for messages in (self.calibrate.message, self.correct.message, self.tools.message):
             messages.connect(self.say)
@@ -273,7 +272,7 @@ class CameraView(QWidget):
         """Show numbers, histogram and state."""
         image = self.view.image
         if image is not None and image is self._newest:
-            self._histogram = histogram(image.data, self.view.full)
+            self._histogram = histogram(image.data, self.view.pixels.full)
             self.contrast.show_histogram(self._histogram)
         self.status.refresh(self._histogram)
         self._readouts += 1
@@ -326,7 +325,7 @@ class CameraView(QWidget):
         if text == self.note.text:
             return
         self.note.text = text
-        self.view.set_greyed(bool(text))
+        self.view.pixels.set_greyed(bool(text))
         self.view.redraw()
 
     def refresh(self) -> None:

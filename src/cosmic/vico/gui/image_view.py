@@ -150,6 +150,11 @@ class Tool(Protocol):
 class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
     """Shows the image it was given last; the view stays when the next one comes.
 
+    Attributes
+    ----------
+    pixels : CameraImageItem
+        Draws the image: its contrast, its marks, and whether it is old.
+
     Signals
     -------
     pointed(object)
@@ -179,11 +184,11 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
         self.image: CameraImage | None = None
         self._fitted = True
         self._wheeled = 0
-        self._pixels = CameraImageItem()
+        self.pixels = CameraImageItem()
         self.box = pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False, defaultPadding=0)
         self.box.disableAutoRange()
         self.setCentralItem(self.box)
-        self.box.addItem(self._pixels.item)
+        self.box.addItem(self.pixels.item)
         self.box.sigRangeChangedManually.connect(self._on_moved_by_hand)
         self.box.sigTransformChanged.connect(self.zoom_changed)
         self.setMouseTracking(True)
@@ -196,32 +201,10 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
 
     # What is shown
 
-    @property
-    def levels(self) -> Levels:
-        """What is shown black and white."""
-        return self._pixels.levels
-
-    @property
-    def full(self) -> int:
-        """Brightness of an over-exposed pixel of the image shown."""
-        return self._pixels.full
-
-    def set_levels(self, levels: Levels) -> None:
-        """Change the contrast."""
-        self._pixels.set_levels(levels)
-
-    def set_marks(self, marks: bool) -> None:
-        """Colour pixels that are over-exposed or quite black, or not."""
-        self._pixels.set_marks(marks)
-
-    def set_greyed(self, greyed: bool) -> None:
-        """Show that the image is old."""
-        self._pixels.set_greyed(greyed)
-
     def show_image(self, image: CameraImage) -> None:
         """Show `image` instead of the one before."""
         self.image = image
-        if self._pixels.show(image) and self._fitted:
+        if self.pixels.show(image) and self._fitted:
             self.fit()
         self.redraw()  # the layers lie over the margins as well
 

@@ -4,8 +4,8 @@ import pytest
 from pydantic import ValidationError
 
 from cosmic.mico.core.motion.orders import MoveBy, MoveTo, Step
+from cosmic.mico.core.motion.settings import MotionDefaults
 from cosmic.mico.core.poses import Pose
-from cosmic.mico.core.settings import MotionDefaults
 from cosmic.mico.core.trajectory.binding import (
     AxisFacts,
     Bound,
@@ -16,7 +16,7 @@ from cosmic.mico.core.trajectory.binding import (
 )
 from cosmic.mico.core.trajectory.mirror import mirrored
 from cosmic.mico.core.trajectory.model import TrajectoryError
-from cosmic.mico.core.trajectory.parser import parse
+from cosmic.mico.core.trajectory.reader import parse
 from cosmic.mico.core.trajectory.settings import MirrorSettings
 from cosmic.mico.core.trajectory.writer import to_text
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from cosmic.mico.core.trajectory import parser
+from cosmic.mico.core.trajectory import reader
 from cosmic.mico.core.trajectory.model import Leg, Move, Speed, Steps, TrajectoryError, Wait
-from cosmic.mico.core.trajectory.parser import parse
+from cosmic.mico.core.trajectory.reader import parse
 from cosmic.mico.core.trajectory.writer import to_text
 
 HEAD = "cosmic-trajectory 1\nplatform FiberStation\n"
@@ -170,17 +170,17 @@ def test_a_file_that_is_missing_or_huge_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(TrajectoryError, match="cannot be read"):
-        parser.load(tmp_path / "none.trajectory")
+        reader.load(tmp_path / "none.trajectory")
     with pytest.raises(TrajectoryError, match="cannot be read"):
-        parser.load(tmp_path)
-    monkeypatch.setattr(parser, "LARGEST_BYTES", 1000)
-    monkeypatch.setattr(parser, "MOST_LINES", 50)
+        reader.load(tmp_path)
+    monkeypatch.setattr(reader, "LARGEST_BYTES", 1000)
+    monkeypatch.setattr(reader, "MOST_LINES", 50)
     (tmp_path / "huge").write_bytes(b"#" * 2000)
     with pytest.raises(TrajectoryError, match="larger than"):
-        parser.load(tmp_path / "huge")
+        reader.load(tmp_path / "huge")
     (tmp_path / "long").write_text("\n" * 100, encoding="utf-8")
     with pytest.raises(TrajectoryError, match="100 lines"):
-        parser.load(tmp_path / "long")
+        reader.load(tmp_path / "long")
 
 
 def test_reading_reports_how_far_it_is() -> None:

@@ -8,11 +8,11 @@ from cosmic.mico.core.collision.checker import NoCollisionModel
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.motion.checks import Limits
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
-from cosmic.mico.core.settings import MotionDefaults
+from cosmic.mico.core.motion.settings import MotionDefaults
 from cosmic.mico.core.trajectory.binding import AxisFacts, PlatformFacts, bind
 from cosmic.mico.core.trajectory.clearance import ClearanceSearch
-from cosmic.mico.core.trajectory.parser import parse
 from cosmic.mico.core.trajectory.pure_gate import PureAnswers, pure_copy
+from cosmic.mico.core.trajectory.reader import parse
 from cosmic.mico.core.trajectory.rehearsal import Rehearsal, RehearsalSetup, rehearse
 from cosmic.mico.core.trajectory.timing import LANDING_S, move_s
 from cosmic.mico.hw.interface import Channel, PositionerKind

@@ -120,7 +120,7 @@ def test_an_image_shows_its_own_time_though_the_force_side_was_asked_later() -> 
         route.go(-5200.0, 500.0)
         stage.follow(route, held_until_s=1e9)
         assert bench.scene.force_side is not None
-        bench.scene.force_side.moment(bench.now_s + 0.2 + ahead_s)
+        bench.scene.force_side.timeline.moment(bench.now_s + 0.2 + ahead_s)
         (line,) = (
             each
             for each in bench.optics.centre_lines_um(bench.now_s + 0.2)
@@ -138,7 +138,7 @@ def test_the_probe_is_seen_bending_the_fibre() -> None:
     assert abs(_seen_below(bench, free_px)) < 0.2
     bench.go(probe_y=-5080.0)
     assert bench.scene.force_side is not None
-    (push,) = bench.scene.force_side.moment(bench.now_s).pushes
+    (push,) = bench.scene.force_side.timeline.moment(bench.now_s).pushes
     beside_um = push.deflection_um + 50.0 * 1.5 * push.deflection_um / push.abscissa_um
     seen_um = _seen_below(bench, free_px) / bench.optics.projection(bench.now_s).px_um
     assert seen_um == pytest.approx(beside_um, rel=0.05)

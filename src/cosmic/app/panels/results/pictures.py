@@ -270,8 +270,9 @@ class ResultPictures(QWidget):
         self.seen.analysis = shown.seen
         self._images.setCurrentWidget(self.view)
         self.view.show_image(shown.image)
-        if self.view.levels.high != self.view.full:
-            self.view.set_levels(Levels(0.0, float(self.view.full)))
+        pixels = self.view.pixels
+        if pixels.levels.high != pixels.full:
+            pixels.set_levels(Levels(0.0, float(pixels.full)))
         words = f"{shown.image.camera}: image {shown.index + 1} of {count}"
         if shown.seen is not None:
             sure = sum(each.certain for each in shown.seen.fibres)

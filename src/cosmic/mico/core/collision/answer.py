@@ -1,75 +1,12 @@
-"""What is asked of the collision gate and what it answers, as plain data; without Qt."""
+"""What the collision gate answers, as plain data; without Qt."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from operator import attrgetter
-from typing import Any, Final
+from dataclasses import dataclass, field
+from typing import Final
 
 from cosmic.mico.core.collision.model import BodyPair
 
 INSIDE_TEXT: Final = "closer than the margin already; they may only move apart"
-
-
-@dataclass(frozen=True)
-class AxisSpan:
-    """Where one axis may be from now until the movement is over, in its unit.
-
-    Attributes
-    ----------
-    low, high : float
-        All places it can be at; infinite ends stand for the hard stops.
-    now : float or None
-        Where it stands as far as is known; None while it moves or is unknown.
-    moving : bool
-        It is about to move or does already. Pairs that no moving axis brings closer to each
-        other are not looked at.
-    estimated : bool
-        The position is believed, not measured: the span is widened by the drive's uncertainty.
-    free : bool
-        It was taken out of collision detection: on its own it makes no pair worth looking at.
-    heading : int or None
-        Which way it goes on from `now` while it moves, 1 or -1; None: either, or nobody knows.
-        What lies behind is part of the span, but is not gone to again.
-    spread : float or None
-        How far an estimated axis may be from where it is believed to be, in its unit; None: the
-        drive's uncertainty.
-    """
-
-    low: float
-    high: float
-    now: float | None = None
-    moving: bool = False
-    estimated: bool = False
-    free: bool = False
-    heading: int | None = None
-    spread: float | None = None
-
-    @property
-    def end(self) -> float | None:
-        """Where a movement goes; None when it has two ends or nobody knows where it starts."""
-        if self.now is None or not self.low <= self.now <= self.high:
-            return None
-        if self.heading is not None:
-            return self.high if self.heading > 0 else self.low
-        ends = [end for end in (self.low, self.high) if end != self.now]
-        return ends[0] if len(ends) == 1 else None
-
-
-Spans = Mapping[str, AxisSpan]
-PackedSpans = Mapping[str, tuple[Any, ...]]
-
-# Tuples are written and read faster than objects.
-_values_of: Final = attrgetter(*(each.name for each in fields(AxisSpan)))
-
-
-def pack_spans(spans: Spans) -> PackedSpans:
-    """Return `spans` as plain tuples."""
-    return {axis: _values_of(span) for axis, span in spans.items()}
-
-
-def unpack_spans(packed: PackedSpans) -> Spans:
-    """Return what `pack_spans` packed."""
-    return {axis: AxisSpan(*values) for axis, values in packed.items()}
 
 
 @dataclass(frozen=True)

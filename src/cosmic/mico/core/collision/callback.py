@@ -7,7 +7,8 @@ from typing import Final
 from typing_extensions import override
 
 from cosmic.frame.plugins import Backend, NoOptions
-from cosmic.mico.core.collision.answer import Approach, Spans
+from cosmic.mico.core.collision.answer import Approach
+from cosmic.mico.core.collision.checker import Spans
 
 
 class Response(StrEnum):

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 from cosmic.frame.clock import WALL
-from cosmic.mico.core.collision.answer import Spans
+from cosmic.mico.core.collision.checker import Spans
 from cosmic.mico.core.collision.model import BodyPair
 from cosmic.mico.core.collision.sweep import Sweep
 

@@ -10,9 +10,9 @@ from typing_extensions import override
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.verdict import ALLOWED, MoveVerdict, Reason
 from cosmic.mico.core.collision import words
-from cosmic.mico.core.collision.answer import INSIDE_TEXT, Approach, Spans, SweepAnswer
+from cosmic.mico.core.collision.answer import INSIDE_TEXT, Approach, SweepAnswer
 from cosmic.mico.core.collision.callback import CollisionCallbackBase, RefuseContact, Response
-from cosmic.mico.core.collision.checker import CollisionChecker
+from cosmic.mico.core.collision.checker import CollisionChecker, Spans
 from cosmic.mico.core.collision.exemptions import Exemptions
 from cosmic.mico.core.collision.helper_link import GateProcess, LateAnswerError, NoAnswerError
 from cosmic.mico.core.collision.model import BodyPair, SceneModel, pair_of

@@ -16,7 +16,8 @@ from typing import Any, Final
 from cosmic.frame.garbage import freeze_what_is_loaded
 from cosmic.frame.helper_process import READY, End, encode
 from cosmic.frame.platform_services import end_process_after
-from cosmic.mico.core.collision.answer import Approach, SweepAnswer, unpack_spans
+from cosmic.mico.core.collision.answer import Approach, SweepAnswer
+from cosmic.mico.core.collision.checker import unpack_spans
 from cosmic.mico.core.collision.clear_travel import clear_travel
 from cosmic.mico.core.collision.sweep import Sweep
 

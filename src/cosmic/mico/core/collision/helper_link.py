@@ -20,7 +20,8 @@ from cosmic.frame.helper_process import (
     HelperProcess,
     HelperRefusalError,
 )
-from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer, pack_spans
+from cosmic.mico.core.collision.answer import Approach, SweepAnswer
+from cosmic.mico.core.collision.checker import Spans, pack_spans
 from cosmic.mico.core.collision.model import BodyPair, SceneModel
 
 logger = logging.getLogger(__name__)

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.mico.core.collision.answer import AxisSpan, Spans
+from cosmic.mico.core.collision.checker import AxisSpan, Spans
 from cosmic.mico.core.collision.model import Drive, Floats, Joint, JointKind, SceneModel
 
 Flags = npt.NDArray[np.bool_]

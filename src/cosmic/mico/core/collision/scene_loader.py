@@ -26,8 +26,13 @@ from cosmic.mico.core.collision.scene_settings import (
     ToolFrameSettings,
 )
 from cosmic.mico.core.collision.scene_shapes import ShapeMaker
-from cosmic.mico.core.collision.scene_tree import order_joints
-from cosmic.mico.core.collision.scene_urdf import Description, LinkText, turned, understand
+from cosmic.mico.core.collision.scene_urdf import (
+    Description,
+    LinkText,
+    order_joints,
+    turned,
+    understand,
+)
 from cosmic.mico.core.collision.scene_xml import (
     XmlFile,
     check_urdf_text,

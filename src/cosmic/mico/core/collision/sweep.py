@@ -7,8 +7,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.mico.core.collision.answer import INSIDE_TEXT, Approach, Spans, SweepAnswer
+from cosmic.mico.core.collision.answer import INSIDE_TEXT, Approach, SweepAnswer
 from cosmic.mico.core.collision.arrangement import Arrangement, Turned
+from cosmic.mico.core.collision.checker import Spans
 from cosmic.mico.core.collision.fcl_pieces import ConvexPiece, gap_along, overlaps, separation
 from cosmic.mico.core.collision.model import BodyPair, Floats, SceneModel
 from cosmic.mico.core.collision.motion_box import (

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 from cosmic.frame.units import DISPLAY
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
-from cosmic.mico.core.collision.answer import Approach, AxisSpan, Spans
+from cosmic.mico.core.collision.answer import Approach
+from cosmic.mico.core.collision.checker import AxisSpan, Spans
 from cosmic.mico.core.collision.model import BodyPair, JointKind, SceneModel
 
 

@@ -6,7 +6,14 @@ from functools import partial
 
 from typing_extensions import override
 
-from cosmic.frame.errors import CosmicError, DeviceError, MoveCancelled, NotAvailable, refusal
+from cosmic.frame.errors import (
+    CosmicError,
+    DeviceError,
+    DeviceFault,
+    MoveCancelled,
+    NotAvailable,
+    refusal,
+)
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.motion.channel_context import ChannelContext
 from cosmic.mico.core.motion.channel_speed import ChannelSpeed, quietly
@@ -19,7 +26,7 @@ from cosmic.mico.core.motion.messages import CheckedMove, GroupMoveSent, Order, 
 from cosmic.mico.core.motion.motion_monitor import ActiveMove, MotionMonitor
 from cosmic.mico.core.motion.orders import Jog, Motion, MoveBy, MoveTo, Reservation, Steer
 from cosmic.mico.core.motion.positioner import Confidence, PositionerBase
-from cosmic.mico.hw.interface import Direction
+from cosmic.mico.hw.interface import Direction, PositionerKind, ReferenceKind
 
 logger = logging.getLogger(__name__)
 
@@ -117,6 +124,26 @@ class ChannelController:
         self.speed = ChannelSpeed(positioner, context.controller, context.settings.defaults)
         self.monitor = MotionMonitor(positioner, context, self.speed)
         self._starting: tuple[int, JogRun] | None = None
+
+    def begin(self) -> None:
+        """Set the usual speed of an axis that was found, and ask for what is not known of it."""
+        if self._positioner.state.kind is not PositionerKind.OPEN_LOOP:
+            usual_hz = self._context.settings.defaults.closed_loop_frequency_hz
+            self.speed.set_usual(self._positioner.frequency_hz or usual_hz)
+            self.monitor.ask_position_known()
+            found = self._positioner.state.positioner
+            if found is not None and found.reference is ReferenceKind.END_STOP:
+                self._ask_safe_direction()
+        self.monitor.ask_activity()
+        self.monitor.ask_position()
+
+    def _ask_safe_direction(self) -> None:
+        """Ask in which direction a reference is searched; where unknown, it may be either."""
+        try:
+            self._context.controller.ask_safe_direction(self._positioner.state.address)
+        except DeviceError as exc:
+            if exc.fault is not DeviceFault.UNSUPPORTED:
+                raise
 
     def set_frequency(self, frequency_hz: int) -> None:
         """Limit the closed-loop speed; a jog, or one that arrives with others, keeps its own."""

@@ -8,7 +8,7 @@ from typing import Final
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.mico.core.motion.jog import JogRun, SteerRun
 from cosmic.mico.core.motion.positioner import PositionerBase
-from cosmic.mico.core.settings import MotionDefaults
+from cosmic.mico.core.motion.settings import MotionDefaults
 from cosmic.mico.hw.interface import Controller
 
 logger = logging.getLogger(__name__)

@@ -9,8 +9,7 @@ from typing import Final, NamedTuple, Self, TypeVar
 
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import ALLOWED, MoveVerdict, Reason, refuse
-from cosmic.mico.core.collision.answer import AxisSpan, Spans
-from cosmic.mico.core.collision.checker import CollisionChecker
+from cosmic.mico.core.collision.checker import AxisSpan, CollisionChecker, Spans
 from cosmic.mico.core.motion.lease import Guard
 from cosmic.mico.core.motion.orders import (
     AMPLITUDE_V,
@@ -70,7 +69,7 @@ class Limits:
         return cls(
             largest_step={"um": defaults.largest_step_um, "deg": defaults.largest_step_deg},
             stale_s=settings.watch.stale_s,
-            counted=counted_travels(settings),
+            counted=counted_travels(settings.positioner, defaults),
         )
 
 

@@ -26,7 +26,7 @@ from cosmic.mico.core.motion.positioner import (
     class_for,
     positioner_driver,
 )
-from cosmic.mico.core.settings import PositionerSettings
+from cosmic.mico.core.motion.settings import PositionerSettings
 from cosmic.mico.hw.interface import (
     ActivityRead,
     Capabilities,

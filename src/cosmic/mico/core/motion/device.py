@@ -29,12 +29,11 @@ from cosmic.frame.operation import Task
 from cosmic.frame.threads import JOIN_TIMEOUT_S, WorkerThread
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.motion.channel import ChannelController
-from cosmic.mico.core.motion.channel_context import AxisReports, ChannelContext
+from cosmic.mico.core.motion.channel_context import AxisReports, ChannelContext, GateQueue
 from cosmic.mico.core.motion.data_container import DeviceDataContainer
 from cosmic.mico.core.motion.discovery import ChannelDiscovery
 from cosmic.mico.core.motion.driver_watch import DriverCalls
 from cosmic.mico.core.motion.gate import Gate
-from cosmic.mico.core.motion.gate_queue import GateQueue
 from cosmic.mico.core.motion.messages import (
     DeviceLost,
     GateAnswer,
@@ -49,7 +48,7 @@ from cosmic.mico.core.motion.messages import (
     StopAll,
     Wake,
 )
-from cosmic.mico.core.motion.positioner import CountedTravel, PositionerState
+from cosmic.mico.core.motion.positioner import CountedTravel, PositionerBase, PositionerState
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import (
     Controller,
@@ -133,6 +132,7 @@ class Device(WorkerThread):
             inbox=self._inbox,
         )
         self._discovery = ChannelDiscovery(self._context)
+        self._channels: dict[int, ChannelController] = {}
         container.observe(lambda event, _state: self._inbox.put(event))
 
     @property
@@ -144,10 +144,6 @@ class Device(WorkerThread):
     def stall(self) -> str:
         """Why it takes no orders: the library does not return; empty while it does."""
         return self._stall
-
-    @property
-    def _channels(self) -> dict[int, ChannelController]:
-        return self._discovery.channels
 
     # For any thread
 
@@ -293,7 +289,9 @@ class Device(WorkerThread):
         """
         found = self.container.positioner(channel)
         counts = found is not None and not found.has_sensor
-        travel = CountedTravel.of(found.settings, self._settings) if found and counts else None
+        travel = None
+        if found and counts:
+            travel = CountedTravel.of(found.settings, self._settings.defaults)
         self.container.set_estimate(channel, travel, position, std)
         self._inbox.put(PublishState(channel))
 
@@ -445,7 +443,7 @@ class Device(WorkerThread):
         axis.set_up(message, asked=asked)
 
     def _on_order(self, order: Order) -> None:
-        axis = self._discovery.channels.get(order.channel)
+        axis = self._channels.get(order.channel)
         if axis is None or not self._discovery.over:
             self._turn_away(order, None)
             return
@@ -521,11 +519,19 @@ class Device(WorkerThread):
         if event.channel is None:
             self._on_device_event(event)
         elif axis is None:
-            self._discovery.take(event, channel)
+            self._welcome(channel, self._discovery.take(event, channel))
         else:
             axis.monitor.take(event)
             self._context.reports.state(channel)
-        self._discovery.look()
+        if not self._discovery.over and all(
+            each.monitor.located for each in self._channels.values()
+        ):
+            self._discovery.look(self._channels.keys())
+
+    def _welcome(self, channel: int, found: PositionerBase | None) -> None:
+        if found is not None:
+            axis = self._channels[channel] = ChannelController(found, self._context)
+            axis.begin()
 
     def _on_device_event(self, event: Event) -> None:
         """Take what concerns the device as a whole, and so each of its channels."""
@@ -591,7 +597,8 @@ class Device(WorkerThread):
     def _on_lost(self, error: DeviceError) -> None:
         self._open = False
         logger.error("device %d is lost: %s", self.index, error)
-        axes = self._discovery.give_up()
+        axes, self._channels = self._channels, {}
+        self._discovery.give_up()
         # What the gate is asked for belongs to a movement that goes on, such as that of a loop.
         moving = any(each.monitor.active is not None for each in axes.values())
         in_motion = moving or bool(self._queries.orders)

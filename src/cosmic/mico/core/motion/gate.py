@@ -10,8 +10,7 @@ from typing import Final
 from cosmic.frame.clock import WALL
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision import words
-from cosmic.mico.core.collision.answer import AxisSpan
-from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
+from cosmic.mico.core.collision.checker import AxisSpan, CollisionChecker, NoCollisionModel
 from cosmic.mico.core.motion.checks import (
     Decision,
     Limits,

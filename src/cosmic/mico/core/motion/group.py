@@ -19,8 +19,9 @@ from cosmic.mico.core.motion.messages import Order
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import FREQUENCY_HZ, Motion, Reservation
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState, class_for
+from cosmic.mico.core.motion.settings import MotionDefaults
 from cosmic.mico.core.motion.straight import AxisTravel, StraightLine
-from cosmic.mico.core.settings import MicoSettings, MotionDefaults
+from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Capabilities, Channel, Controller, MatchedMove
 
 logger = logging.getLogger(__name__)
@@ -205,23 +206,27 @@ class GroupOrders:
         self._on_refused = on_refused
         self._on_started = on_started
 
-    def check(self, motions: Mapping[str, Motion], *, consent: bool) -> MoveVerdict:
+    def check(self, motions: Mapping[str, Motion], *, consent: bool = False) -> MoveVerdict:
         """Return what the gate says to `motions`, and those linked to them, as they are now."""
         self._check_names(motions)
         return self._gate.check(self._requests(self._with_linked(motions), consent=consent))
 
-    def order(
+    def order_together(
         self,
         motions: Mapping[str, Motion],
         *,
         source: str,
-        consent: bool,
-        linked: bool,
-        match_arrival: bool,
-        follows: Mapping[str, Movement],
+        consent: bool = False,
+        linked: bool = True,
+        match_arrival: bool = False,
+        follows: Mapping[str, Movement] | None = None,
         slow_hz: Mapping[str, int] | None = None,
     ) -> dict[str, Order]:
-        """Start `motions` together, or none of them; see `ManagerPort.order_together`."""
+        """Decide `motions` together and start them back to back, or none.
+
+        `slow_hz` limits the steps per second of single axes for this movement.
+        """
+        follows = follows or {}
         self._check_names(motions)
         if linked:
             named = len(motions)

@@ -8,8 +8,8 @@ from threading import Lock
 
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.events import Event, Unsubscribe
-from cosmic.mico.core.link_settings import LinkSettings, mistake
 from cosmic.mico.core.motion.orders import Motion, MoveBy, MoveTo
+from cosmic.mico.core.motion.settings import LinkSettings, mistake
 
 logger = logging.getLogger(__name__)
 

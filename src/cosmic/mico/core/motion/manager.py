@@ -10,6 +10,7 @@ from collections.abc import (
     Set,
 )
 from contextlib import contextmanager
+from enum import StrEnum
 from threading import RLock
 from typing import Final
 
@@ -29,12 +30,11 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.heartbeat import OPEN_S, Heartbeat, HeartbeatWatch
 from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.threads import JOIN_TIMEOUT_S, WorkerThread, urgent
-from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.collision.exemptions import Exemptions
 from cosmic.mico.core.collision.model import BodyPair
-from cosmic.mico.core.mode import Mode
 from cosmic.mico.core.motion.checks import Limits
 from cosmic.mico.core.motion.data_container import (
     DeviceDataContainer,
@@ -48,12 +48,12 @@ from cosmic.mico.core.motion.group import GroupOrders
 from cosmic.mico.core.motion.inventory import open_devices, take_inventory
 from cosmic.mico.core.motion.lease import Lease
 from cosmic.mico.core.motion.links import LinkTable
-from cosmic.mico.core.motion.messages import DeviceLost, Order
-from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import Interval, Motion
+from cosmic.mico.core.motion.messages import DeviceLost
+from cosmic.mico.core.motion.orders import Interval
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
+from cosmic.mico.core.motion.settings import WatchSettings
 from cosmic.mico.core.motion.stop_latch import StopLatch
-from cosmic.mico.core.settings import MicoSettings, WatchSettings
+from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Channel, Controller
 
 logger = logging.getLogger(__name__)
@@ -208,6 +208,15 @@ WATCHED_AGAIN: Final = (
 )
 
 
+class Mode(StrEnum):
+    """What `DeviceManager` is at."""
+
+    CLOSED = "closed"
+    INITIALISATION = "initialisation"
+    RUN_TIME = "run-time"
+    FAILED = "failed"
+
+
 class DeviceManager(QObject):
     """Initialises the controller, makes a `Device` and a `DeviceListener` for each device.
 
@@ -226,6 +235,8 @@ class DeviceManager(QObject):
         Several axes were started back to back; in the thread of a device.
     links_changed()
         Axes were linked, or are linked no more.
+    position_changed, state_changed, movement_begun, movement_ended, movement_refused
+        Those of every `Device` there is or comes to be, in its thread.
     """
 
     changed = Signal()
@@ -233,6 +244,11 @@ class DeviceManager(QObject):
     group_refused = Signal(object)
     group_started = Signal(object)
     links_changed = Signal()
+    position_changed = Signal(object)
+    state_changed = Signal(object)
+    movement_begun = Signal(object)
+    movement_ended = Signal(object)
+    movement_refused = Signal(object)
 
     def __init__(
         self,
@@ -261,7 +277,7 @@ class DeviceManager(QObject):
         self._closed = False
         self._threads = DeviceThreads(controller, settings.watch, policy)
         self.gate = self._make_gate(checker or NoCollisionModel())
-        self._groups = self._make_groups()
+        self.groups = self._make_groups()
         if self.exemptions is not None:
             self.exemptions.on_watched_again = self._on_watched_again
         self._arrange({})
@@ -474,8 +490,14 @@ class DeviceManager(QObject):
             settings=self.settings,
             policy=self._policy,
         )
-        device.lost.connect(self._on_device_lost, Qt.ConnectionType.DirectConnection)
-        device.stop_late.connect(self._on_stop_late, Qt.ConnectionType.DirectConnection)
+        direct = Qt.ConnectionType.DirectConnection
+        device.lost.connect(self._on_device_lost, direct)
+        device.stop_late.connect(self._on_stop_late, direct)
+        device.position_changed.connect(self.position_changed, direct)
+        device.state_changed.connect(self.state_changed, direct)
+        device.movement_begun.connect(self.movement_begun, direct)
+        device.movement_ended.connect(self.movement_ended, direct)
+        device.movement_refused.connect(self.movement_refused, direct)
         return device
 
     def _start(self, numbers: Collection[int]) -> None:
@@ -546,37 +568,6 @@ class DeviceManager(QObject):
     def _set_mode(self, mode: Mode) -> None:
         self._mode = mode
         self.changed.emit()
-
-    # Run time
-
-    def check(self, motions: Mapping[str, Motion], *, consent: bool = False) -> MoveVerdict:
-        """Return what the gate says to all of `motions` together, without moving anything."""
-        return self._groups.check(motions, consent=consent)
-
-    def order_together(
-        self,
-        motions: Mapping[str, Motion],
-        *,
-        source: str,
-        consent: bool = False,
-        linked: bool = True,
-        match_arrival: bool = False,
-        follows: Mapping[str, Movement] | None = None,
-        slow_hz: Mapping[str, int] | None = None,
-    ) -> dict[str, Order]:
-        """Decide `motions` together and start them back to back, or none; see `ManagerPort`.
-
-        `slow_hz` limits the steps per second of single axes for this movement.
-        """
-        return self._groups.order(
-            motions,
-            source=source,
-            consent=consent,
-            linked=linked,
-            match_arrival=match_arrival,
-            follows=follows or {},
-            slow_hz=slow_hz,
-        )
 
     def _check_ready(self) -> None:
         if self._mode is not Mode.RUN_TIME:

@@ -636,7 +636,7 @@ class MotionMonitor:
         """Estimate where an axis without sensor is after `active`."""
         if self._positioner.has_sensor:
             return
-        travel = CountedTravel.of(self._positioner.settings, self._context.settings)
+        travel = CountedTravel.of(self._positioner.settings, self._context.settings.defaults)
         distance = counted_distance(active, travel.step_um, self._context.clock.now_s())
         state = self._positioner.state
         where, std = travel.after(state.position or 0.0, state.std, distance)

@@ -1,7 +1,7 @@
 """Positioners: what is known of each, and what each kind can be asked to do (thesis 5.4)."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, ClassVar, Final, Self
@@ -26,7 +26,7 @@ from cosmic.mico.core.motion.orders import (
     Step,
     ToEndStop,
 )
-from cosmic.mico.core.settings import MicoSettings, PositionerSettings
+from cosmic.mico.core.motion.settings import MotionDefaults, PositionerSettings
 from cosmic.mico.hw.interface import (
     Activity,
     Channel,
@@ -348,13 +348,13 @@ class CountedTravel:
     end_std_um: float
 
     @classmethod
-    def of(cls, axis: PositionerSettings, settings: MicoSettings) -> Self:
+    def of(cls, axis: PositionerSettings, defaults: MotionDefaults) -> Self:
         """Return that of an axis without sensor."""
         low, high = axis.travel_um or (-math.inf, math.inf)
         return cls(
             low=low,
             high=high,
-            step_um=axis.step_um or settings.defaults.nominal_step_um,
+            step_um=axis.step_um or defaults.nominal_step_um,
             step_std=STEP_STD if axis.step_std is None else axis.step_std,
             end_std_um=END_STD_UM if axis.end_std_um is None else axis.end_std_um,
         )
@@ -410,11 +410,13 @@ class CountedTravel:
         )
 
 
-def counted_travels(settings: MicoSettings) -> Mapping[str, CountedTravel]:
+def counted_travels(
+    axes: Iterable[PositionerSettings], defaults: MotionDefaults
+) -> Mapping[str, CountedTravel]:
     """Return those of all axes without sensor, by name."""
     return {
-        each.name: CountedTravel.of(each, settings)
-        for each in settings.positioner
+        each.name: CountedTravel.of(each, defaults)
+        for each in axes
         if each.positioner_kind is PositionerKind.OPEN_LOOP
     }
 

@@ -12,7 +12,7 @@ from typing import Final
 
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import ALLOWED, MoveVerdict, Reason, refuse
-from cosmic.mico.core.collision.answer import AxisSpan, Spans
+from cosmic.mico.core.collision.checker import AxisSpan, Spans
 from cosmic.mico.hw.interface import MatchedMove
 
 FINE: Final = 0.1

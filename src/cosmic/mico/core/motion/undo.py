@@ -2,10 +2,10 @@
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import count
-from threading import Lock, RLock
+from threading import RLock
 from typing import Final
 
 from PySide6.QtCore import QObject, Qt, Signal
@@ -13,91 +13,12 @@ from PySide6.QtCore import QObject, Qt, Signal
 from cosmic.frame.errors import NotAvailable, refusal
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import Reason, refuse
-from cosmic.mico.core.motion.device import Device
+from cosmic.mico.core.motion.cautions import Cautions
 from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.messages import MovementBegun, Order
 from cosmic.mico.core.motion.orders import Motion, MoveTo, Step
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.hw.interface import PositionerKind
-
-Doubt = Callable[[], str]
-"""Returns in words what speaks against it now; empty where nothing does. Any thread, at once."""
-
-_CLOSED_UM: Final = 1.0
-"""Closing by less is no grasp."""
-
-
-class Cautions:
-    """Collects doubts of every subsystem that has any; any thread."""
-
-    def __init__(self) -> None:
-        self._doubts: tuple[Doubt, ...] = ()
-        self._touched: tuple[Callable[[str], object], ...] = ()
-        self._lock = Lock()
-
-    def add(self, doubt: Doubt) -> None:
-        """Ask `doubt`, too, from now on."""
-        with self._lock:
-            self._doubts = (*self._doubts, doubt)
-
-    def reasons(self) -> tuple[str, ...]:
-        """Return what speaks against moving now without looking first."""
-        return tuple(text for text in (doubt() for doubt in self._doubts) if text)
-
-    def on_touch(self, listener: Callable[[str], object]) -> None:
-        """Call `listener(text)` at each touch, in the thread that felt it; it returns at once."""
-        with self._lock:
-            self._touched = (*self._touched, listener)
-
-    def touched(self, text: str) -> None:
-        """Tell that something was touched, in words, though it may be over soon."""
-        for each in self._touched:
-            each(text)
-
-
-class ClosedGrippers(QObject):
-    """Watches actuators without sensor, which are grippers: closed ones may hold something.
-
-    What counts is the widest opening seen since the start; one that was opened as wide again holds
-    nothing. The opening is counted from steps, so this errs towards asking.
-    """
-
-    def __init__(self, manager: DeviceManager, parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self._manager = manager
-        self._widest: dict[str, float] = {}
-        self._now: dict[str, float] = {}
-        self._joined: dict[int, Device] = {}
-        self._join_devices()
-        manager.changed.connect(self._join_devices, Qt.ConnectionType.DirectConnection)
-
-    def _join_devices(self) -> None:
-        for index, device in self._manager.devices.items():
-            if self._joined.get(index) is not device:
-                self._joined[index] = device
-                device.state_changed.connect(
-                    self._on_state_changed, Qt.ConnectionType.DirectConnection
-                )
-
-    def _on_state_changed(self, state: PositionerState) -> None:
-        position = state.position
-        if state.kind is not PositionerKind.OPEN_LOOP or position is None:
-            return
-        self._now[state.name] = position
-        self._widest[state.name] = max(position, self._widest.get(state.name, position))
-
-    def doubt(self) -> str:
-        """Return which grippers were closed, and how far."""
-        closed = {
-            name: self._widest[name] - now
-            for name, now in list(self._now.items())
-            if self._widest[name] - now > _CLOSED_UM
-        }
-        return "; ".join(
-            f"{name} was closed by {format_quantity(by_um, 'um')} and may hold something"
-            for name, by_um in sorted(closed.items())
-        )
-
 
 UNDO: Final = "undo"
 DEPTH: Final = 10
@@ -161,18 +82,10 @@ class UndoHistory(QObject):
         self._group_of = {
             name: group.title for group in manager.settings.group for name in group.positioners
         }
-        self._joined: dict[int, Device] = {}
-        self._join_devices()
-        manager.changed.connect(self._join_devices, Qt.ConnectionType.DirectConnection)
-        self._cautions.on_touch(self._on_touch)
-
-    def _join_devices(self) -> None:
         direct = Qt.ConnectionType.DirectConnection
-        for index, device in self._manager.devices.items():
-            if self._joined.get(index) is not device:
-                self._joined[index] = device
-                device.movement_begun.connect(self._on_movement_begun, direct)
-                device.state_changed.connect(self._on_state_changed, direct)
+        manager.movement_begun.connect(self._on_movement_begun, direct)
+        manager.state_changed.connect(self._on_state_changed, direct)
+        self._cautions.on_touch(self._on_touch)
 
     def group_of(self, axis: str) -> str:
         """Return the assembly that an axis belongs to; an axis of no group is its own."""
@@ -322,7 +235,7 @@ class UndoHistory(QObject):
             for name, motion in motions.items()
             if isinstance(motion, MoveTo)
         }
-        return self._manager.order_together(motions, source=UNDO, slow_hz=slow_hz)
+        return self._manager.groups.order_together(motions, source=UNDO, slow_hz=slow_hz)
 
     def _slow_hz(self, name: str, unit: str) -> int:
         defaults, undo = self._manager.settings.defaults, self._manager.settings.undo

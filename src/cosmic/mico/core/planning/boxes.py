@@ -7,7 +7,8 @@ from typing import Final
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import refusal
-from cosmic.mico.core.collision.answer import Approach, AxisSpan, Spans
+from cosmic.mico.core.collision.answer import Approach
+from cosmic.mico.core.collision.checker import AxisSpan, Spans
 from cosmic.mico.core.collision.model import BodyPair, SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
 from cosmic.mico.core.collision.words import cannot_check

@@ -7,7 +7,8 @@ from typing import Final
 
 from cosmic.frame.errors import UnknownAxisError, refusal
 from cosmic.frame.verdict import Reason, refuse
-from cosmic.mico.core.collision.answer import Approach, Spans
+from cosmic.mico.core.collision.answer import Approach
+from cosmic.mico.core.collision.checker import Spans
 from cosmic.mico.core.collision.model import SceneModel
 
 LONGEST_S: Final = 3600.0

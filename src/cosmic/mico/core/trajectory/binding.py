@@ -14,8 +14,8 @@ from cosmic.mico.core.motion.orders import (
     Step,
 )
 from cosmic.mico.core.motion.positioner import PositionerState, class_for
+from cosmic.mico.core.motion.settings import MotionDefaults
 from cosmic.mico.core.poses import Pose
-from cosmic.mico.core.settings import MotionDefaults
 from cosmic.mico.core.trajectory.model import (
     Leg,
     Move,

@@ -4,7 +4,8 @@ from collections.abc import Iterable, Mapping, Set
 
 from typing_extensions import override
 
-from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
+from cosmic.mico.core.collision.answer import Approach, SweepAnswer
+from cosmic.mico.core.collision.checker import Spans
 from cosmic.mico.core.collision.clear_travel import clear_travel
 from cosmic.mico.core.collision.collision_manager import Answering, CollisionManager
 from cosmic.mico.core.collision.model import BodyPair, SceneModel

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from cosmic.mico.core.motion.orders import Motion, Step
-from cosmic.mico.core.settings import MotionDefaults
+from cosmic.mico.core.motion.settings import MotionDefaults
 from cosmic.mico.core.trajectory.binding import AxisFacts, nominal_step
 
 LANDING_S: Final = 0.025

@@ -1,4 +1,4 @@
-"""Writing a trajectory as text that `parser` reads."""
+"""Writing a trajectory as text that `reader` reads."""
 
 from collections.abc import Iterable
 

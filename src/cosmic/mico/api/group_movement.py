@@ -1,4 +1,4 @@
-"""Several axes that move together."""
+"""`GroupMovement`: several axes that move together, and how they are begun."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -57,7 +57,7 @@ class GroupMovement(Operation[dict[str, float | None]]):
 
     @classmethod
     def of(cls, orders: Mapping[str, Order]) -> Self:
-        """Return the future of what `DeviceManager.order_together` ordered."""
+        """Return the future of what `GroupOrders.order_together` ordered."""
         start = next((order.start for order in orders.values()), None)
         return cls({name: order.movement for name, order in orders.items()}, start)
 
@@ -152,7 +152,7 @@ def move_together(
     CosmicError
         What ended one of them early, or the refusal: then nothing has moved.
     """
-    orders = manager.order_together(motions, source=source, consent=consent, linked=linked)
+    orders = manager.groups.order_together(motions, source=source, consent=consent, linked=linked)
     together = GroupMovement.of(orders)
     task.on_cancel(together.cancel)
     together.wait()

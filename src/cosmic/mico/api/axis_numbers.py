@@ -1,10 +1,8 @@
-"""Numbers and texts as scripts and other stations give them, looked at where they come in."""
+"""Numbers in the unit of an axis, as scripts and stations give them, checked where they come in."""
 
 import math
-from typing import Final
 
 from cosmic.frame.errors import QuantityError, refusal
-from cosmic.frame.network.caller import current_call
 from cosmic.frame.units import DISPLAY, parse_quantity
 from cosmic.frame.verdict import Reason, refuse
 
@@ -12,31 +10,11 @@ Number = float | int | str
 """A number in the unit of the axis, or a text with its own unit, such as "0.2 mm"."""
 
 
-_LONGEST: Final = 120
-
-
 def finite(value: float, what: str) -> float:
     """Return `value`; raises `MoveRefused` where it is no finite number."""
     if not math.isfinite(value):
         raise refusal(refuse(Reason.NOT_FINITE, f"{what} must be a finite number, not {value!r}"))
     return value
-
-
-def one_line(text: str) -> str:
-    """Return `text` as it may stand in a log: short, and in one line."""
-    return "".join(each if each.isprintable() else " " for each in text[:_LONGEST])
-
-
-def source_of(source: str) -> str:
-    """Return who commands, for the log: `source` here, the name of a client before it."""
-    call = current_call()
-    return source if call is None else f"{call.caller.name} {one_line(source)}".strip()
-
-
-def caller_token() -> str:
-    """Return the token of the client whose call this thread carries out; empty for none."""
-    call = current_call()
-    return "" if call is None else call.caller.token
 
 
 def as_number(value: object, unit: str, axis: str) -> float:
