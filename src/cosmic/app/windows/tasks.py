@@ -18,7 +18,7 @@ from cosmic.app.panels.force import ForcePanel
 from cosmic.app.panels.history import HistoryPanel
 from cosmic.app.panels.image_bar import ImageBar
 from cosmic.app.panels.instruments import DAQCO, LENS, Instruments
-from cosmic.app.panels.procedures import CONTROL, TELEOPERATION, TRAJECTORIES
+from cosmic.app.panels.motion_tabs import CONTROL, TELEOPERATION, TRAJECTORIES
 from cosmic.app.panels.recorded import RECORDER, RecorderPanel
 from cosmic.app.panels.results.panel import ResultsPanel
 from cosmic.app.panels.scene import ScenePanel
