@@ -29,8 +29,8 @@ from cosmic.daqco.core.unclosed_file import (
     missing_bytes,
 )
 from cosmic.frame.errors import RecordingError
+from cosmic.frame.file_holder import FileHold, Life, ProcessMark
 from cosmic.frame.kept_file import toml_lines, write_whole
-from cosmic.frame.process_mark import FileHold, Life, ProcessMark
 
 logger = logging.getLogger(__name__)
 
