@@ -6,7 +6,7 @@ import pytest
 
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import ConfigError
-from cosmic.twin.sample import put_on
+from cosmic.twin.sample_layout import put_on
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import shipped_settings
 from cosmic.twin.truth import TruthFile, read_truth
