@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QWidget
 from cosmic.mico.core.teleoperation.state import TeleoperationPhase as Phase
 from cosmic.mico.gui.mapping_table import DIRECTION, NOW, SCALE, SPEED
 from cosmic.mico.gui.teleoperation_panel import TeleoperationPanel, make_teleoperation_panel
-from cosmic.mico.hw.sdl_virtual import VirtualGamepad
+from cosmic.testing.virtual_gamepad import VirtualGamepad
 from gui.mico.panels import show
 from unit.mico.rigs import mico
 
