@@ -81,7 +81,7 @@ class Carried:
     Attributes
     ----------
     anchor : str
-        The point it follows, a key of `Workplace.tips`.
+        The point it follows, a key of `Workspace.tips`.
     line_um : ndarray, shape (n, 3), float64
         Where it is relative to that.
     angle_rad : float

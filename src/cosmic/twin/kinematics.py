@@ -38,7 +38,7 @@ class Joint:
 
     Attributes
     ----------
-    position : ndarray, shape (4, 4), float64
+    offset : ndarray, shape (4, 4), float64
         `parent_from_child` while the joint stands at zero.
     axis : ndarray, shape (3,), float64
         Unit vector in the child's frame.

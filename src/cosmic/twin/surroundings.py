@@ -23,4 +23,4 @@ class Surroundings(Protocol):
 
     @abstractmethod
     def anchor(self, name: str) -> Point:
-        """Return a tip, as `Workplace.tips` names it."""
+        """Return a tip, as `Workspace.tips` names it."""

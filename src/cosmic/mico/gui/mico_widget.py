@@ -94,7 +94,7 @@ class MicoWidget(QWidget):
         What was refused for that axis holds no longer: it has moved since.
     undo_planned(object)
         The poses that Undo leads through, while it is asked about or under way; None afterwards.
-    detour_requested(DetourRequest)
+    detour_wanted(DetourRequest)
         Something stands in the way of a move, while detours are planned.
     """
 
