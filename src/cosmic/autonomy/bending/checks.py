@@ -43,7 +43,6 @@ MOSTLY: Final = 0.6
 RELAXES_FROM: Final = 0.04
 RELAXES_MOST: Final = 0.16
 RUBS_FROM: Final = 0.35
-BEAM_POWER: Final = -3.0
 NO_BEAM_POWER: Final = -1.5
 BAD: Final = (
     Quality.SATURATED,

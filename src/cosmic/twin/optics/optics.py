@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from cosmic.twin.optics.subjects import Subjects
 
 MICROSCOPE: Final = "microscope"
-OVERVIEW: Final = "overview"
 
 
 class RoiLike(Protocol):

@@ -161,27 +161,6 @@ def displacement(before: Pixels, after: Pixels, region: Roi, reach_px: float) ->
     return template.find(after, template.centre_px, reach_px)
 
 
-def drift_px(before: Pixels, after: Pixels) -> tuple[Pair, float]:
-    """Return how far a whole image went, by phase correlation, and how clearly, 0 to 1.
-
-    Raises
-    ------
-    ConfigError
-        The images are of different sizes.
-    """
-    if before.shape != after.shape or before.ndim != 2:
-        raise ConfigError(
-            f"tracking: images of {before.shape} and {after.shape} cannot be compared; "
-            "take both with the same ROI and binning, in grey"
-        )
-    rows, columns = before.shape
-    window = cv2.createHanningWindow((columns, rows), cv2.CV_32F)
-    (x, y), response = cv2.phaseCorrelate(
-        before.astype(np.float32), after.astype(np.float32), window
-    )
-    return (float(x), float(y)), float(response)
-
-
 def _gradient(pixels: Floats32, x: int, y: int) -> Floats:
     # Sobel's sums count eight for a grey level a pixel.
     return np.asarray(cv2.Sobel(pixels, cv2.CV_64F, x, y, ksize=3, scale=0.125))
