@@ -6,8 +6,9 @@ from typing import Literal
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.centre_line import CentreLine
-from cosmic.twin.fibre import Fibre, Floats, PlatePose
+from cosmic.twin.fibre import Fibre, PlatePose
 from cosmic.twin.force_settings import FibreSettings
 from cosmic.twin.kinematics import Point
 from cosmic.twin.optics.bent import Compliance

@@ -12,11 +12,10 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import ConfigError
 
-Floats = npt.NDArray[np.float64]
 Point = tuple[float, float, float]
 
 UM_PER_M: Final = 1e6

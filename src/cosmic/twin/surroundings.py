@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
-from cosmic.twin.fibre import Floats
+from cosmic.frame.arrays import Floats
 from cosmic.twin.kinematics import Point
 from cosmic.twin.tools import Tool
 

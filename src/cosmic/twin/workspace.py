@@ -5,11 +5,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import NotAvailable
 from cosmic.twin.climate import Climate
 from cosmic.twin.contacts import PLATE_HALF_UM, Contacts
 from cosmic.twin.felt import Felt, Moment, Push
-from cosmic.twin.fibre import Fibre, Floats, Line, ProbeShape
+from cosmic.twin.fibre import Fibre, Line, ProbeShape
 from cosmic.twin.fibre_state import state_of
 from cosmic.twin.force_settings import FibreSettings
 from cosmic.twin.gripper_contacts import GripperContacts

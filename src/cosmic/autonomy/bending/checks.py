@@ -23,8 +23,9 @@ from cosmic.autonomy.bending.inference import (
     varied_covariance,
 )
 from cosmic.autonomy.bending.population import Assessed
-from cosmic.autonomy.bending.result import BendingResult, Floats, Quality, SpanFit
+from cosmic.autonomy.bending.result import BendingResult, Quality, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.frame.arrays import Floats
 
 LEAST_SPANS: Final = 2
 LEAST_FOR_ONE_OUT: Final = 4

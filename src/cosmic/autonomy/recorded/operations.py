@@ -46,9 +46,9 @@ from cosmic.autonomy.shipped.operation_procedures import (
 )
 from cosmic.autonomy.shipped.single_operation import SingleOperation
 from cosmic.daqco.api.daqco import Daqco
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import ConfigError, DeviceTimeout
 from cosmic.mico.core.motion.positioner import positions_of
-from cosmic.vico.core.pixel_map import Floats
 
 LOOK_S: Final = 0.05
 """Over which a force is averaged while it is waited for."""

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.force_side import ForceSide
-from cosmic.twin.kinematics import Floats, Point
+from cosmic.twin.kinematics import Point
 from cosmic.twin.lens import LensAxisName, TwinLens
 from cosmic.twin.light import TwinLight
 from cosmic.twin.optics.drawing import (

@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.twin.optics.canvas import Floats, Layer, cover, patch
+from cosmic.frame.arrays import Floats
+from cosmic.twin.optics.canvas import Layer, cover, patch
 from cosmic.twin.optics.ground import FULL, Dirt, even_light, soil
 from cosmic.twin.optics.noise import Noise
 from cosmic.twin.optics.projection import STEADY, Area, Projection, Wobble, project

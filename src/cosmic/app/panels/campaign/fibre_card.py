@@ -33,8 +33,9 @@ from cosmic.autonomy.campaign.formatting import (
     width_words,
     with_interval,
 )
-from cosmic.autonomy.campaign.records import FibreImage, Floats
-from cosmic.autonomy.campaign.snapshot import FibreCardData, Mask, SpanCurve
+from cosmic.autonomy.campaign.records import FibreImage
+from cosmic.autonomy.campaign.snapshot import FibreCardData, SpanCurve
+from cosmic.frame.arrays import Floats, Mask
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.chip import Chip

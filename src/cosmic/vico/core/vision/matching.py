@@ -6,13 +6,11 @@ from typing import Final
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats, Floats32
 from cosmic.frame.errors import ConfigError
 from cosmic.vico.hw.interface import Pixels, Roi
 
-Floats = npt.NDArray[np.float64]
-Floats32 = npt.NDArray[np.float32]
 Pair = tuple[float, float]
 
 SMALLEST_TEMPLATE_PX: Final = 12

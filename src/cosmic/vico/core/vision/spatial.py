@@ -10,9 +10,9 @@ from typing import Final
 import cv2
 import numpy as np
 
+from cosmic.frame.arrays import Floats, Floats32
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.vico.core.vision.focal_stack import FocalStack, vertices
-from cosmic.vico.core.vision.grey import Floats, Floats32
 from cosmic.vico.core.vision.profiles import Flags
 from cosmic.vico.core.vision.smoothing import arc_lengths, resampled
 from cosmic.vico.hw.interface import Pixels
