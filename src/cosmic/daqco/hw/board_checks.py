@@ -10,6 +10,8 @@ from cosmic.frame.verdict import Reason, refuse
 
 # NI's connectors carry blocks of sixteen: ai0 pairs with ai8, ai16 with ai24 (M Series manual).
 _BLOCK: Final = 16
+BUFFER_S: Final = 10.0
+"""So long a board keeps samples that nobody fetches."""
 
 
 def negative_input(info: BoardInfo, positive: str) -> str | None:

@@ -25,7 +25,6 @@ from cosmic.app.panels.state_indicator import StateIndicator
 from cosmic.autonomy.campaign.formatting import (
     EI_LABEL,
     NONE,
-    TWO_SIDED,
     interval,
     length_words,
     number,
@@ -44,6 +43,7 @@ from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.palette import OKABE_ITO, ON_IMAGE, Palette
 from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
 from cosmic.frame.overrides import override
+from cosmic.frame.units import TWO_SIDED
 
 
 class FibreImageView(QWidget):
