@@ -412,7 +412,7 @@ def _declared_by(kind: type[Declared]) -> Declaration:
             declaration_of(found.parts[name].kind)  # what it names may travel as well
     for name, of in found.newest.items():
         if of not in found.streams:
-            raise TypeError(f"{kind.__name__}.{name} is the newest of {of}, which is no stream")
+            raise TypeError(f"{kind.__name__}.{name} is the newest of {of}, which is not a stream")
     return found
 
 

@@ -235,8 +235,8 @@ def overwritten(path: Path) -> None:
     ("harm", "message"),
     [
         (nothing, "No such file"),
-        (text, "is no recording by CoSMic; nothing was changed"),
-        (foreign, "no recording by CoSMic"),
+        (text, "is not a recording by CoSMic; nothing was changed"),
+        (foreign, "not a recording by CoSMic"),
         (foreign_and_open, "h5clear"),
         (cut_short, "damaged beyond what can be mended, and nothing was changed"),
         (overwritten, "damaged beyond what can be mended, and nothing was changed"),

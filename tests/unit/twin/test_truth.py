@@ -137,5 +137,5 @@ def test_what_is_no_truth_is_not_written_over(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="give another name"):
         written(notes)
     assert notes.read_text(encoding="utf-8") == "my notes\n"
-    with pytest.raises(ConfigError, match="is no file"):
+    with pytest.raises(ConfigError, match="is not a file"):
         written(tmp_path)

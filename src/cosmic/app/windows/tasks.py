@@ -350,7 +350,7 @@ class TaskLayout(QObject):
         in_scene = self.central_view.large == SCENE_TITLE
         problem = "" if in_scene else view.camera.calibration_problem
         if not problem and name not in view.camera.targets:
-            problem = f"the {name} is no tool that the image knows"
+            problem = f"the {name} is not a tool that the image knows"
         on = self._scene.moving if in_scene else bool(view.tools.target)
         if not in_scene and not on:
             self._scene.set_moving(False)  # Escape has put the tool away

@@ -61,7 +61,7 @@ WORDS: Final = {
     "between spans",
     Quality.HINGE: "spans beyond one place are softer than those before: a weak place, or a kink",
     Quality.NON_UNIFORM: "the spans' stiffnesses do not follow one beam: the fibre is not uniform",
-    Quality.NOT_A_FIBRE: "stiffness does not fall with the length of the span: this is no fibre",
+    Quality.NOT_A_FIBRE: "stiffness does not fall with the length of the span: this is not a fibre",
     Quality.RELAXED: "the force relaxes so much that stiffness depends on how long one waits",
 }
 

@@ -86,7 +86,7 @@ class NaturalShape:
                 "list of at least two of each is needed"
             )
         if not (np.isfinite(ahead).all() and np.isfinite(aside).all()):
-            raise BendingError("the fibre's shape holds values that are no numbers")
+            raise BendingError("the fibre's shape holds values that are not numbers")
         if not (np.diff(ahead) > 0.0).all() or not ahead[0] < self.at_um <= ahead[-1]:
             raise BendingError(
                 f"the fibre's shape must rise along the jaws up to the probe at {self.at_um:g} um"

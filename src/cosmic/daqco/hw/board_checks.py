@@ -39,7 +39,7 @@ def range_in_force(info: BoardInfo, each: InputSettings) -> tuple[float, float]:
     """
     if not each.low_v < each.high_v:
         raise _limit(
-            f"{info.name}/{each.input}: {each.low_v:g} to {each.high_v:g} V is no range; "
+            f"{info.name}/{each.input}: {each.low_v:g} to {each.high_v:g} V is not a range; "
             f"low must lie below high",
             value=each.low_v,
             limit=each.high_v,

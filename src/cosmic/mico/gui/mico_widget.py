@@ -445,5 +445,5 @@ class MicoWidget(QWidget):
 def make_mico_gui(application: CosmicApplicationBase) -> MicoWidget:
     """Return the GUI component of a `MicoApplicationBase`; its `gui_factory`."""
     if not isinstance(application, MicoApplicationBase):
-        raise TypeError(f"{application!r} is no MicoApplication")
+        raise TypeError(f"{application!r} is not a MicoApplication")
     return MicoWidget(mico_of(application, "window"))

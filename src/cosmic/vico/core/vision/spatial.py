@@ -141,7 +141,7 @@ def in_space(
     if not (0.0 < view.scale_um_px < np.inf and view.distance_um > 0.0):
         raise ConfigError(
             f"heights: a scale of {view.scale_um_px} um/px and a distance of {view.distance_um} um "
-            "are no view"
+            "are not a view"
         )
     line = resampled(np.asarray(line_px, dtype=np.float64), STEP_PX)
     along = arc_lengths(line)
