@@ -9,3 +9,5 @@ Floats32 = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
 ByteMask = npt.NDArray[np.uint8]
 """As OpenCV takes a mask: 0, or anything else."""
+Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
+"""An image as a camera gives it."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
-from cosmic.frame.arrays import Floats
+from cosmic.frame.arrays import Floats, Pixels
 from cosmic.twin.force_side import ForceSide
 from cosmic.twin.kinematics import Point
 from cosmic.twin.lens import LensAxisName, TwinLens
@@ -18,7 +18,6 @@ from cosmic.twin.optics.drawing import (
     Drawer,
     Drawing,
     LocalDrawer,
-    Pixels,
     RemoteDrawer,
     drawing_process,
 )
