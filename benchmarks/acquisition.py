@@ -32,11 +32,11 @@ from cosmic.daqco.api.recording import open_recording
 from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, LimitSettings
 from cosmic.daqco.gui.plotter import UDaqPlotter
 from cosmic.daqco.hw.interface import BoardLibrary
-from cosmic.daqco.hw.sim_fast import FastLibrary
 from cosmic.daqco.hw.sim_library import SimulatedLibrary
 from cosmic.frame.clock import Clock, WallClock
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.testing.fast_board import FastLibrary
 
 NAME = "acquisition"
 CALL = "SA_Stop_A"

@@ -24,9 +24,9 @@ from scipy.optimize import minimize
 from benchmarks import fibre_images, figures
 from benchmarks.fibre_pairs import TOLD_APART, Drawn, Kind, draw
 from benchmarks.figures import Figure
+from cosmic.frame.arrays import ByteMask
 from cosmic.vico.api import Fibre, find_fibres
 from cosmic.vico.core.vision import axial, beyond, certainty
-from cosmic.vico.core.vision.grey import Mask
 from cosmic.vico.core.vision.profiles import Scene
 from cosmic.vico.core.vision.refine import Course
 
@@ -95,7 +95,7 @@ def recorded() -> Iterator[list[Traced]]:
     """Keep everything that is found meanwhile."""
     found: list[Traced] = []
 
-    def signs_of(scene: Scene, course: Course, explained: Mask) -> certainty.Signs:
+    def signs_of(scene: Scene, course: Course, explained: ByteMask) -> certainty.Signs:
         found.append(Traced(scene, course, original(scene, course, explained)))
         return found[-1].signs
 

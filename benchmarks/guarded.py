@@ -283,8 +283,8 @@ def start() -> Ratios:
 def acquisition() -> Ratios:
     """Return what handling 32 channels at 15 kHz costs, recorded, without boards and plot."""
     from benchmarks.acquisition import chain, settings
-    from cosmic.daqco.hw.sim_fast import FastLibrary
     from cosmic.frame.clock import WallClock
+    from cosmic.testing.fast_board import FastLibrary
 
     wanted = settings(("Fast1",), 15_000.0)
 

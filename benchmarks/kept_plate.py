@@ -15,7 +15,7 @@ import tomlkit
 from cosmic.frame.config import load_model, shipped_config_dir
 from cosmic.twin.centre_line import CentreLine
 from cosmic.twin.force_settings import FibreSettings
-from cosmic.twin.sample import put_on
+from cosmic.twin.sample_layout import put_on
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.truth import TruthEvent, read_truth
 

@@ -16,7 +16,7 @@ from benchmarks.stand import Stand, stand, wait_until
 from cosmic.mico.core.teleoperation.settings import TeleoperationProfileSettings
 from cosmic.mico.core.teleoperation.state import TeleoperationPhase
 from cosmic.mico.hw.interface import PositionerKind
-from cosmic.mico.hw.sdl_virtual import VirtualGamepad
+from cosmic.testing.virtual_gamepad import VirtualGamepad
 
 NAME = "teleoperation"
 MOVE, STOP = "SA_MovePositionAbsolute_A", "SA_Stop_A"

@@ -293,7 +293,7 @@ def record_and_repeat(scene: Scene) -> None:
         mico.move({"left.x": 0.0, "left.y": 0.0})
 
     scene.behind(record)
-    panel = scene.window.procedures
+    panel = scene.window.motion_tabs
     if panel is None:
         raise RuntimeError("the window has no trajectories")
     panel.trajectories.open(scene.folder / "over.trajectory")

@@ -116,7 +116,7 @@ def test_what_a_brought_controller_raises_is_named_and_takes_no_other_along() ->
         assert caught.value.device == 4
     joined.stop(Channel(0, 0))
     brought.error, brought.says = None, "not an event"
-    with pytest.raises(DeviceError, match="is no event"):
+    with pytest.raises(DeviceError, match="is not an event"):
         joined.receive(4, 0.0)
     joined.close()
 

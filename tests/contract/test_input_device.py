@@ -8,9 +8,9 @@ import pytest
 from cosmic.mico.hw.input_device import InputSource
 from cosmic.mico.hw.keyboard_input import KeyboardSource
 from cosmic.mico.hw.sdl_input import SdlSource
-from cosmic.mico.hw.sdl_virtual import VirtualGamepad
 from cosmic.mico.hw.sim_haptic import SimHapticSource
 from cosmic.testing.inputs import InputContract
+from cosmic.testing.virtual_gamepad import VirtualGamepad
 
 
 class TestGamepads(InputContract):

@@ -209,7 +209,7 @@ def test_nobody_replaces_what_is_shipped(write_package: Write) -> None:
         ("import no_such_vendor\n", "ModuleNotFoundError.*no_such_vendor"),
         ("1 / 0\n", "ZeroDivisionError"),
         ("OTHER = 1\n", "BACKEND"),
-        ("BACKEND = 'boards'\n", "no cosmic Backend but a str"),
+        ("BACKEND = 'boards'\n", "not a cosmic Backend but a str"),
     ],
 )
 def test_a_package_that_is_broken_is_named(write_package: Write, code: str, reason: str) -> None:

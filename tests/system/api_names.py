@@ -45,8 +45,8 @@ from cosmic.autonomy.shipped.single_operation import (
     OperationResult,
     SingleOperation,
 )
-from cosmic.daqco.api.channel_shape import ChannelHandle
 from cosmic.daqco.api.daqco import Daqco, DaqCounters, DaqLimit
+from cosmic.daqco.api.plan_channel import ChannelHandle
 from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.curves import Slope

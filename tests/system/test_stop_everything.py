@@ -15,7 +15,7 @@ from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.planned_path import PlannedPath
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.core.trajectory.reader import parse
-from cosmic.mico.hw.sdl_virtual import VirtualGamepad
+from cosmic.testing.virtual_gamepad import VirtualGamepad
 from cosmic.twin.scene import Scene
 from system.simulated_platform import platform, wait_until
 

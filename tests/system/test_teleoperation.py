@@ -12,7 +12,7 @@ from cosmic.daqco.core.scale import Scale
 from cosmic.frame.clock import WALL
 from cosmic.mico.core.teleoperation.state import TeleoperationPhase as Phase
 from cosmic.mico.hw.interface import Channel
-from cosmic.mico.hw.sdl_virtual import VirtualGamepad
+from cosmic.testing.virtual_gamepad import VirtualGamepad
 from system.simulated_platform import wait_until
 
 LEFT_X = Channel(0, 0)

@@ -27,9 +27,10 @@ from cosmic.autonomy.bending.fit import (
     measure_fibre,
 )
 from cosmic.autonomy.bending.plan import DRY_EI_N_M2, guess_ei, plan_spans
-from cosmic.autonomy.bending.result import BendingError, BendingResult, Floats
+from cosmic.autonomy.bending.result import BendingError, BendingResult
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.platform_services import own_session
 

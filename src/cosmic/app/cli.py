@@ -520,7 +520,7 @@ def _masses(text: str) -> tuple[float, ...]:
     except ValueError:
         masses = ()
     if not masses or not all(0.0 < each < math.inf for each in masses):
-        raise argparse.ArgumentTypeError(f"{text!r} are no masses above 0 such as 1,2,5")
+        raise argparse.ArgumentTypeError(f"{text!r} are not masses above 0 such as 1,2,5")
     return masses
 
 
@@ -530,7 +530,7 @@ def _count(text: str) -> int:
     except ValueError:
         value = 0
     if not 1 <= value <= _MOST:
-        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 1 to {_MOST}")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to {_MOST}")
     return value
 
 
@@ -555,7 +555,9 @@ def _moment(text: str) -> datetime:
     try:
         return datetime.fromisoformat(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no time such as 2026-11-23T08:00") from None
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a time such as 2026-11-23T08:00"
+        ) from None
 
 
 def _seconds(text: str) -> float:

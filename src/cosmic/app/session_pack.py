@@ -85,7 +85,7 @@ def pack_session(sources: Iterable[Path], target: Path, *, name: str = "") -> Pa
     if not found:
         raise RecordingError("there is nothing to pack")
     if not target.parent.is_dir():
-        raise RecordingError(f"{target}: {target.parent} is no folder; name one that there is")
+        raise RecordingError(f"{target}: {target.parent} is not a folder; name one that there is")
     if target.exists():
         raise RecordingExistsError(f"{target}: there is such a file; choose another name")
     part = target.with_name(target.name + ".part")

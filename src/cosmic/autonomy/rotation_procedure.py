@@ -8,6 +8,7 @@ import numpy as np
 
 from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.moving import Mover
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.operation import Task
 from cosmic.mico.api.mico import Mico
@@ -15,7 +16,7 @@ from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.core.calibration import RotationCentre
 from cosmic.vico.core.calibration_fit import CalibrationRefused, RotationFit, fit_rotation
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.pixel_map import Floats, PixelMap
+from cosmic.vico.core.pixel_map import PixelMap
 from cosmic.vico.core.vision.algorithms import grey
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.fibre_tracking import FibreTracker

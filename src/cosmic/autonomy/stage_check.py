@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from cosmic.autonomy.stage_procedure import StageProcedure
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.kept_file import toml_lines
 from cosmic.frame.operation import Operation, Task
 from cosmic.vico.core.calibration_fit import Sighting
-
-Floats = npt.NDArray[np.float64]
 
 STEP_UM: Final = 50.0
 """From one position of an axis to the next."""

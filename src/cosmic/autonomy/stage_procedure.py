@@ -9,11 +9,11 @@ from typing import Final, TypeVar
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.moving import Mover
 from cosmic.autonomy.tools import axis_targets, tip_um
+from cosmic.frame.arrays import ByteMask, Floats
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.operation import Task
 from cosmic.mico.api.mico import Mico
@@ -27,8 +27,6 @@ from cosmic.vico.core.vision.tips import find_gripper, find_probe
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen
 from cosmic.vico.hw.interface import CameraSettings, Pixels
 
-Floats = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.uint8]
 T = TypeVar("T")
 
 LEAST_CHANGE: Final = 15.0
@@ -39,7 +37,7 @@ BROAD: Final = 0.6
 """Narrower than this part of the tool's width is no tool: fibres, edges, noise."""
 
 
-def uncovered(before: Pixels, after: Pixels, width_px: float) -> Mask:
+def uncovered(before: Pixels, after: Pixels, width_px: float) -> ByteMask:
     """Return where a dark tool stood before and does not afterwards, without what is narrow."""
     scale = 1.0 if before.dtype == np.uint8 else 255.0 / max(1.0, float(before.max()))
     change = cv2.blur(scale * (after.astype(np.float32) - before.astype(np.float32)), (3, 3))
@@ -50,7 +48,7 @@ def uncovered(before: Pixels, after: Pixels, width_px: float) -> Mask:
     return np.asarray(opened, dtype=np.uint8)
 
 
-def middle(mask: Mask) -> Floats | None:
+def middle(mask: ByteMask) -> Floats | None:
     """Return the middle of what is marked, x and y; None where nothing is.
 
     Of a gripper the jaws' ends are marked, each as a patch: what lies between their middles counts.

@@ -110,6 +110,12 @@ def reason_of(given: object) -> str:
     return "".join(each if each.isprintable() else " " for each in text[:_LONGEST_REASON])
 
 
+def check_fault(name: str, known: Collection[str]) -> None:
+    """Raise `ArgumentError` where a simulator knows no fault of this name."""
+    if name not in known:
+        raise ArgumentError(f"there is no fault {name!r}; known: {', '.join(known)}")
+
+
 def check_path(name: str, path: str | Path) -> None:
     """Refuse what no file can be called: too long, or with a zero in it.
 

@@ -145,7 +145,9 @@ def read_entries(path: Path) -> Iterator[dict[str, Any]]:
     except OSError as exc:
         raise ConfigError(f"{path}: cannot be read ({exc.strerror or exc})") from exc
     if lines and not entries:
-        raise ConfigError(f"{path}: is no audit trail: no line of it is an entry, written as JSON")
+        raise ConfigError(
+            f"{path}: is not an audit trail: no line of it is an entry, written as JSON"
+        )
 
 
 def _entry(line: str) -> dict[str, Any] | None:

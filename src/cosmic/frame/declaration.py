@@ -174,6 +174,9 @@ def stream(
 ) -> Callable[[F], F]:
     """Declare a method as a stream: it takes a receiver and returns the function that ends it.
 
+    A method with a second parameter `wanted` is handed a function that says whether anybody
+    receives it now, so that nothing is made that nobody wants.
+
     Parameters
     ----------
     rule : Rule
@@ -183,9 +186,6 @@ def stream(
     missing : callable or None
         `missing(before, after)` says how much was lost between two that came one after the other;
         by default each one lost counts.
-
-    A method with a second parameter `wanted` is handed a function that says whether anybody
-    receives it now, so that nothing is made that nobody wants.
     """
     return lambda marked: _marked(marked, _StreamMark(rule, topic, missing))
 
@@ -412,7 +412,7 @@ def _declared_by(kind: type[Declared]) -> Declaration:
             declaration_of(found.parts[name].kind)  # what it names may travel as well
     for name, of in found.newest.items():
         if of not in found.streams:
-            raise TypeError(f"{kind.__name__}.{name} is the newest of {of}, which is no stream")
+            raise TypeError(f"{kind.__name__}.{name} is the newest of {of}, which is not a stream")
     return found
 
 

@@ -4,7 +4,6 @@ import os
 import re
 import shutil
 import unicodedata
-from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
@@ -81,7 +80,6 @@ def file_name(
     suffix: str,
     when: datetime | None = None,
     directory: Path | None = None,
-    taken_by: Iterable[str] = (),
 ) -> str:
     """Return the whole name of a recording.
 
@@ -93,8 +91,6 @@ def file_name(
         Local time of the stamp; needed with `NameOption.TIME`.
     directory : Path, optional
         Where numbers in use are looked up; needed with `NameOption.NUMBER`.
-    taken_by : iterable of str
-        Further endings of files by which a number is in use.
 
     Raises
     ------
@@ -110,14 +106,13 @@ def file_name(
     elif option is NameOption.NUMBER:
         if directory is None:
             raise ValueError("a number needs a directory to look into")
-        stem = f"{stem}_{next_number(stem, directory, (suffix, *taken_by)):03d}"
+        stem = f"{stem}_{next_number(stem, directory, suffix):03d}"
     return stem + suffix
 
 
-def next_number(stem: str, directory: Path, suffixes: Iterable[str]) -> int:
+def next_number(stem: str, directory: Path, suffix: str) -> int:
     """Return the number after the highest in use for `stem` in `directory`; 1 without any."""
-    endings = "|".join(re.escape(each) for each in suffixes)
-    pattern = re.compile(rf"{re.escape(stem)}_(\d+)(?:{endings})", re.IGNORECASE)
+    pattern = re.compile(rf"{re.escape(stem)}_(\d+){re.escape(suffix)}", re.IGNORECASE)
     try:
         names = [each.name for each in directory.iterdir()]
     except OSError:  # `check_directory` says what is wrong with it

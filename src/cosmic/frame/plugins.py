@@ -168,8 +168,8 @@ def find_backend(kind: Kind, name: str) -> Backend[Any, Any]:
         ) from exc
     if not isinstance(backend, Backend):
         raise PluginError(
-            f"{kind.word} {name!r} of {_package(entry)}: {entry.value} is no cosmic Backend but a "
-            f"{type(backend).__name__}"
+            f"{kind.word} {name!r} of {_package(entry)}: {entry.value} is not a cosmic Backend "
+            f"but a {type(backend).__name__}"
         )
     return backend
 

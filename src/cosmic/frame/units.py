@@ -7,6 +7,8 @@ from typing import Final, Literal
 from cosmic.frame.errors import QuantityError
 
 AxisUnit = Literal["um", "deg"]
+TWO_SIDED: Final = 1.96
+"""Standard deviations in half of a 95 % interval."""
 
 _TO_UM: Final = {"nm": 1e-3, "um": 1.0, "µm": 1.0, "μm": 1.0, "mm": 1e3, "cm": 1e4, "m": 1e6}
 _TO_DEG: Final = {

@@ -18,9 +18,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.rod import PushCurve
-
-Floats = npt.NDArray[np.float64]
 
 CELLS: Final = 40
 """Pieces of fibre between contact and clamp."""

@@ -4,11 +4,9 @@ import math
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.optics.shapes import lying
-
-Floats = npt.NDArray[np.float64]
 
 
 class CentreLine:

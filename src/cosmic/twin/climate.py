@@ -5,11 +5,9 @@ import random
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.force_settings import ClimateSettings
-
-Floats = npt.NDArray[np.float64]
 
 STANDARD_RH: Final = 50.0
 """Humidity at which fibres are as their settings have them."""

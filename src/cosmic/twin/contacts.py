@@ -13,7 +13,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.twin.kinematics import Floats, Skeleton, Slide
+from cosmic.frame.arrays import Floats
+from cosmic.twin.kinematics import Skeleton, Slide
 from cosmic.twin.offsets import ToolOffsets
 from cosmic.twin.optics.solids import read_solids
 from cosmic.twin.settings import TwinSettings

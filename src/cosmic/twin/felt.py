@@ -69,7 +69,7 @@ class Moment:
     jaw_un : float
         The part of the force that comes from a jaw.
     tips_um : mapping of str to point
-        See `Workplace.tips`.
+        See `Workspace.tips`.
     """
 
     time_s: float

@@ -8,8 +8,8 @@ from functools import partial
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.cantilever import Cantilever
 from cosmic.twin.centre_line import CentreLine
 from cosmic.twin.climate import STANDARD_RH, STILL_AIR, Climate
@@ -40,7 +40,6 @@ from cosmic.twin.rubbing import (
 from cosmic.twin.section import Section
 from cosmic.twin.tools import Tool
 
-Floats = npt.NDArray[np.float64]
 PlatePose = tuple[float, float, float]
 Why = Literal["stuck", "hanging"]
 
@@ -81,7 +80,7 @@ class Carried:
     Attributes
     ----------
     anchor : str
-        The point it follows, a key of `Workplace.tips`.
+        The point it follows, a key of `Workspace.tips`.
     line_um : ndarray, shape (n, 3), float64
         Where it is relative to that.
     angle_rad : float

@@ -6,8 +6,9 @@ from typing import Literal
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.centre_line import CentreLine
-from cosmic.twin.fibre import Fibre, Floats, PlatePose
+from cosmic.twin.fibre import Fibre, PlatePose
 from cosmic.twin.force_settings import FibreSettings
 from cosmic.twin.kinematics import Point
 from cosmic.twin.optics.bent import Compliance
@@ -32,12 +33,10 @@ class FibreState:
     plate_pose : (float, float, float)
         x, y and angle (rad) of its own frame on the plate, while it lies there.
     anchor : str
-        The tip that it goes along with otherwise; see `Workplace.tips`.
+        The tip that it goes along with otherwise; see `Workspace.tips`.
     relative_um : ndarray, shape (n, 3), float64
         Where it is relative to the anchor, not counting what the probe does to it; empty on the
         plate.
-    rest_um : float
-        So high above the plate its middle lies on it.
     tension_un : float
         Pull between two grippers.
     seen_um : float

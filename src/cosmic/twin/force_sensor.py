@@ -6,13 +6,11 @@ from threading import Lock
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.climate import STILL_AIR, Climate
 from cosmic.twin.force_settings import ForceSensorSettings
 from cosmic.twin.transducer import Flicker, Transducer
-
-Floats = npt.NDArray[np.float64]
 
 LONGEST_RUN: Final = 300.0
 """Time constants filtered in one go; exp of more than 700 would overflow."""

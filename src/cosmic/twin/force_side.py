@@ -4,13 +4,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.force_sensor import ForceSensor
 from cosmic.twin.force_settings import FibreSettings
 from cosmic.twin.guideways import Guideways
 from cosmic.twin.kinematics import Point
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.stage import Stage
-from cosmic.twin.timeline import Floats, Timeline
+from cosmic.twin.timeline import Timeline
 from cosmic.twin.tools import make_skeleton
 from cosmic.twin.truth import NO_TRUTH, Truth
 from cosmic.twin.twin_faults import TwinFaults

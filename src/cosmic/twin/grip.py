@@ -5,13 +5,11 @@ from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.centre_line import CentreLine, turned
 from cosmic.twin.fate import Fate
 from cosmic.twin.kinematics import Point
-
-Floats = npt.NDArray[np.float64]
 
 
 class Free:

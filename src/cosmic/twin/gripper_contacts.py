@@ -7,12 +7,13 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.bonds import Bonds
 from cosmic.twin.centre_line import CentreLine
 from cosmic.twin.climate import Climate
 from cosmic.twin.falls import Falls
 from cosmic.twin.fate import Fate, draw_fate
-from cosmic.twin.fibre import Carried, Fibre, Floats
+from cosmic.twin.fibre import Carried, Fibre
 from cosmic.twin.force_settings import ContactSettings
 from cosmic.twin.grip import make_hold
 from cosmic.twin.handling_settings import HandlingSettings

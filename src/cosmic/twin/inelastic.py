@@ -8,9 +8,8 @@ move the place where the fibre would stand without the probe; the elastic push d
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from cosmic.frame.arrays import Floats
 
 CELLS: Final = 16
 TIMES_S: Final = np.array([0.03, 0.3, 3.0, 30.0, 300.0])

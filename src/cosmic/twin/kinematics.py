@@ -12,11 +12,10 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import ConfigError
 
-Floats = npt.NDArray[np.float64]
 Point = tuple[float, float, float]
 
 UM_PER_M: Final = 1e6
@@ -38,7 +37,7 @@ class Joint:
 
     Attributes
     ----------
-    position : ndarray, shape (4, 4), float64
+    offset : ndarray, shape (4, 4), float64
         `parent_from_child` while the joint stands at zero.
     axis : ndarray, shape (3,), float64
         Unit vector in the child's frame.

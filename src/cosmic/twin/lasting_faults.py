@@ -73,7 +73,7 @@ class LastingFaults:
         for name in named:
             if name not in without:
                 raise ArgumentError(
-                    f"steps_lost: {name!r} is no stage without a sensor; known: "
+                    f"steps_lost: {name!r} is not a stage without a sensor; known: "
                     f"{', '.join(without)}"
                 )
             self._stages[name].step_share = _part(fault, STEPS_MADE) if begins else 1.0

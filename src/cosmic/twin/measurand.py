@@ -3,11 +3,9 @@
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.grip import Hold
-
-Floats = npt.NDArray[np.float64]
 
 CELLS: Final = 200
 

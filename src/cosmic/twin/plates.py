@@ -4,7 +4,7 @@ import math
 import random
 
 from cosmic.twin.force_settings import FibreSettings, StandardSettings
-from cosmic.twin.sample import put_on
+from cosmic.twin.sample_layout import put_on
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.world import World
 

@@ -12,9 +12,8 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from cosmic.frame.arrays import Floats
 
 EI_UN_UM2_PER_N_M2: Final = 1e18
 """1e6 uN in a newton, 1e12 um2 in a square metre."""

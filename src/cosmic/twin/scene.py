@@ -80,8 +80,6 @@ class Scene:
         The lamp; None in a scene of bare stages.
     optics : Optics or None
         What cameras see; None in a scene of bare stages.
-    trigger_lines : mapping of str to TriggerLine
-        The wires that begin at counters of boards, such as "Dev1/ctr0".
     faults : TwinFaults or None
         Trouble with fibres, tips, lamp, lens and sensors, by name.
     truth : Truth
@@ -90,6 +88,11 @@ class Scene:
         What lies on later plates.
     world : str
         Name of the world it was drawn from; "" where nobody said.
+
+    Attributes
+    ----------
+    trigger_lines : mapping of str to TriggerLine
+        The wires that begin at counters of boards, such as "Dev1/ctr0".
     """
 
     def __init__(
@@ -318,7 +321,7 @@ class Scene:
         return {name: stage.position(now_s) for name, stage in self.stages.items()}
 
     def tips(self, now_s: float) -> dict[str, Point]:
-        """Return where the tips of the tools truly are, um, world; see `Workplace.tips`.
+        """Return where the tips of the tools truly are, um, world; see `Workspace.tips`.
 
         Empty in a scene of bare stages.
         """

@@ -195,11 +195,11 @@ class TwinSettings(StrictModel):
         used |= {f"geometry.grippers.{name}": each.stage for name, each in grippers.items()}
         for key, stage in used.items():
             if stage not in self.stages:
-                raise ValueError(f"{key} names {stage!r}, which is no stage")
+                raise ValueError(f"{key} names {stage!r}, which is not a stage")
         for number, fibre in enumerate(self.fibres):
             if fibre.held_by and fibre.held_by not in grippers:
                 raise ValueError(
-                    f"fibres[{number}] is held by {fibre.held_by!r}, which is no gripper; "
+                    f"fibres[{number}] is held by {fibre.held_by!r}, which is not a gripper; "
                     f"known: {', '.join(grippers)}"
                 )
             if fibre.bonded_to is not None and not fibre.bonded_to < number:
@@ -235,7 +235,7 @@ class TwinSettings(StrictModel):
         wired = [name for device in self.devices for name in device.channels if name]
         for name in wired:
             if name not in self.stages:
-                raise ValueError(f"a device is wired to {name!r}, which is no stage")
+                raise ValueError(f"a device is wired to {name!r}, which is not a stage")
             if wired.count(name) > 1:
                 raise ValueError(f"stage {name} is wired twice")
         return self

@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
-from cosmic.twin.fibre import Floats
+from cosmic.frame.arrays import Floats
 from cosmic.twin.kinematics import Point
 from cosmic.twin.tools import Tool
 
@@ -23,4 +23,4 @@ class Surroundings(Protocol):
 
     @abstractmethod
     def anchor(self, name: str) -> Point:
-        """Return a tip, as `Workplace.tips` names it."""
+        """Return a tip, as `Workspace.tips` names it."""

@@ -7,14 +7,12 @@ from threading import Lock
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.felt import Felt, Moment
 from cosmic.twin.guideways import Guideways
 from cosmic.twin.stage import Path, Stage
 from cosmic.twin.workspace import Workspace
-
-Floats = npt.NDArray[np.float64]
 
 KEPT: Final = 20_000
 """So many looks are remembered: 20 s while something moves, much longer while nothing does."""

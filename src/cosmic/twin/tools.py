@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cosmic.twin.kinematics import Drive, Floats, Point, Skeleton, Slide
+from cosmic.frame.arrays import Floats
+from cosmic.twin.kinematics import Drive, Point, Skeleton, Slide
 from cosmic.twin.settings import TwinSettings
 
 

@@ -4,12 +4,10 @@ import math
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.felt import Felt
 from cosmic.twin.force_settings import ForceSensorSettings
-
-Floats = npt.NDArray[np.float64]
 
 PLAY_PART: Final = 0.1
 """Part of the range within which a force may turn before the lagging part of the signal does."""

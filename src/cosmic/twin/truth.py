@@ -92,11 +92,13 @@ def _make_room(path: Path) -> None:
     if not path.exists():
         return
     if not path.is_file():
-        raise ConfigError(f"{path}: is no file; give the name of a new one")
+        raise ConfigError(f"{path}: is not a file; give the name of a new one")
     with path.open("rb") as file:
         begin = file.read(1000)
     if begin.strip() and not begin.startswith(b'{"time_s":'):
-        raise ConfigError(f"{path}: exists and is no file of the twin's truth; give another name")
+        raise ConfigError(
+            f"{path}: exists and is not a file of the twin's truth; give another name"
+        )
     if not begin.strip():
         path.unlink()
         return

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from threading import Lock
 from typing import Final
 
+from cosmic.frame.arguments import check_fault
 from cosmic.frame.errors import ArgumentError
 from cosmic.twin.fate import Fate
 from cosmic.twin.handling_settings import HandlingSettings
@@ -104,7 +105,7 @@ class TwinFaults:
         ArgumentError
             No such fault, or a number that makes no sense.
         """
-        _check_name(name)
+        check_fault(name, NAMES)
         if not times >= 1:
             raise ArgumentError(f"fault {name!r}: times must be 1 or more, got {times!r}")
         if amount is not None and not math.isfinite(amount):
@@ -124,7 +125,7 @@ class TwinFaults:
             No such fault.
         """
         if name is not None:
-            _check_name(name)
+            check_fault(name, NAMES)
         with self._lock:
             ended = [
                 each
@@ -178,8 +179,3 @@ class TwinFaults:
             rise = side * math.tan(math.radians(handling.out_of_plane_deg))
             fate = replace(fate, rise=rise)
         return fate
-
-
-def _check_name(name: str) -> None:
-    if name not in NAMES:
-        raise ArgumentError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")

@@ -5,20 +5,21 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import NotAvailable
-from cosmic.twin.clearance import Clearance
 from cosmic.twin.climate import Climate
 from cosmic.twin.contacts import PLATE_HALF_UM, Contacts
 from cosmic.twin.felt import Felt, Moment, Push
-from cosmic.twin.fibre import Fibre, Floats, Line, ProbeShape
+from cosmic.twin.fibre import Fibre, Line, ProbeShape
 from cosmic.twin.fibre_state import state_of
 from cosmic.twin.force_settings import FibreSettings
 from cosmic.twin.gripper_contacts import GripperContacts
 from cosmic.twin.kinematics import Point, Skeleton
 from cosmic.twin.offsets import ToolOffsets
+from cosmic.twin.probe_contact import ProbeContact
+from cosmic.twin.probe_to_jaws import ProbeToJaws
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.tools import Gripper, Tool, added
-from cosmic.twin.touch import Touch
 from cosmic.twin.truth import NO_TRUTH, Truth, record_plate
 from cosmic.twin.twin_faults import TwinFaults
 
@@ -119,14 +120,14 @@ class Workspace:
         self._gripper_contacts = GripperContacts(
             settings, self.fibres, seed, injected=self.faults, record=self._record, faults=wander
         )
-        self._touches: dict[int, Touch] = {}
+        self._touches: dict[int, ProbeContact] = {}
         self._peaks_un: dict[int | str, float] = {}
-        self._jaw_touches = {name: Touch() for name in self._grippers}
+        self._jaw_touches = {name: ProbeContact() for name in self._grippers}
         self._gaps: dict[str, float] = {}
         self.gripper_stages = frozenset(each.stage for each in self._geometry.grippers.values())
         self._jaw_stages = [(name, each.stage) for name, each in self._geometry.grippers.items()]
         jaws = [slide for each in self._grippers.values() for slide in each.slides]
-        self._clear = Clearance([self._probe, *jaws], self.gripper_stages)
+        self._clear = ProbeToJaws([self._probe, *jaws], self.gripper_stages)
         self._clear_after_um = self._jaws_clear_um = 0.0
         self._slack_um = 0.0
         self._contacts: Contacts | None = None
@@ -320,7 +321,7 @@ class Workspace:
             line = fibre.line(tools)
         touch = self._touches.get(fibre.number)
         if touch is None:
-            touch = self._touches[fibre.number] = Touch()
+            touch = self._touches[fibre.number] = ProbeContact()
         along = line.abscissa_um(probe[0] + self._geometry.probe_contact_um)
         back = fibre.back_um(along)
         travel = line.y_um(along) + fibre.seen_um / 2.0 - probe[1] - back

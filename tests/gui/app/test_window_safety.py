@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.campaign.dock import CAMPAIGN
-from cosmic.app.panels.procedures import TRAJECTORIES
+from cosmic.app.panels.motion_tabs import TRAJECTORIES
 from cosmic.app.panels.recorded import RECORDER
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.frame.gui.stop_button import StopButton

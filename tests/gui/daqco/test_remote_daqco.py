@@ -9,9 +9,9 @@ from PySide6.QtWidgets import QDialogButtonBox
 from contract.daqco_rig import connected, free_port, hosted, settings, used_locally, used_remotely
 from cosmic.daqco.core.file_writer import UDaqFileWriter
 from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
-from cosmic.daqco.gui.export_dialog import StationExportDialog
 from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.main_widget import make_daqco_gui
+from cosmic.daqco.gui.station_export_dialog import StationExportDialog
 from cosmic.frame.threads import declare_gui_thread
 
 Button = QDialogButtonBox.StandardButton

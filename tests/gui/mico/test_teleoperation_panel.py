@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QWidget
 from cosmic.mico.core.teleoperation.state import TeleoperationPhase as Phase
 from cosmic.mico.gui.mapping_table import DIRECTION, NOW, SCALE, SPEED
 from cosmic.mico.gui.teleoperation_panel import TeleoperationPanel, make_teleoperation_panel
-from cosmic.mico.hw.sdl_virtual import VirtualGamepad
+from cosmic.testing.virtual_gamepad import VirtualGamepad
 from gui.mico.panels import show
 from unit.mico.rigs import mico
 
@@ -182,7 +182,7 @@ def test_the_mapping_is_edited_in_the_table(qtbot, panel):
 
 @pytest.mark.parametrize(
     ("column", "text", "why"),
-    [(SCALE, "-1", "greater than 0"), (SCALE, "big", "no number"), (DIRECTION, "2", "-1 or 1")],
+    [(SCALE, "-1", "greater than 0"), (SCALE, "big", "not a number"), (DIRECTION, "2", "-1 or 1")],
 )
 def test_a_wrong_entry_is_refused_in_words_and_the_old_one_is_shown_again(
     qtbot, panel, column, text, why

@@ -61,7 +61,7 @@ def test_a_ratio_that_makes_no_sense_says_why(panel: MicoWidget, qtbot: QtBot) -
     form = part(panel.window(), "linkForm", LinkForm)
     part(form, "linkRatio", QLineEdit).setText("twice")
     click(qtbot, form, "linkAgree")
-    assert "'twice' is no number" in part(form, "linkWhy", QLabel).text()
+    assert "'twice' is not a number" in part(form, "linkWhy", QLabel).text()
     part(form, "linkRatio", QLineEdit).setText("0")
     click(qtbot, form, "linkAgree")
     assert "ratio" in part(card, "status", QLabel).text()

@@ -2,7 +2,14 @@
 
 import pytest
 from PySide6.QtCore import QSettings
-from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QScrollArea, QSlider
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QLineEdit,
+    QScrollArea,
+    QSlider,
+    QSplitter,
+)
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.failure import FailurePolicy
@@ -10,7 +17,7 @@ from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.theme import apply_theme
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.core.settings import CameraConfig, VicoSettings
-from cosmic.vico.gui.vico_gui import VicoGui, VicoWidget, make_vico_gui
+from cosmic.vico.gui.vico_gui import VicoGui, make_vico_gui
 from gui.vico.fake_vico import FakeVico, Found, Seen, fibre_image
 
 
@@ -106,9 +113,11 @@ def test_the_theme_can_change_under_an_image(qtbot, qapp, shown, camera):
     assert light.pixelColor(2, 2).lightness() > dark.pixelColor(2, 2).lightness() + 100
 
 
-def test_a_widget_that_goes_stops_listening(qtbot, port):
-    widget = VicoWidget(port)
+def test_widgets_that_go_stop_listening(qtbot, port):
+    gui, widget = VicoGui(port), QSplitter()
     qtbot.addWidget(widget)
+    for each in (*gui.cameras.values(), gui.lens):
+        widget.addWidget(each)
     assert port.listened
     widget.deleteLater()
     with qtbot.waitSignal(widget.destroyed):

@@ -176,11 +176,11 @@ def test_init_into_a_file_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[
         (["--applications", "miko"], "unknown application 'miko'; known are mico, daqco, vico"),
         (["--listen", "tcp/0.0.0.0:7447"], "only tls with certificates is allowed"),
         (["--listen", "tls/0.0.0.0:7447"], "tls needs certificates"),
-        (["--listen", "somewhere"], "'somewhere' is no endpoint"),
+        (["--listen", "somewhere"], "'somewhere' is not an endpoint"),
         (["--name", "fibre station"], "letters, digits, - and _"),
         (["--certificates", "nowhere"], "nowhere/authority.pem: there is no such file"),
         (["--connect", "fibervision"], "no station 'fibervision' was used before; used were: none"),
-        (["--connect", "=tcp/1"], "'=tcp/1' is no station; it reads NAME=tcp/"),
+        (["--connect", "=tcp/1"], "'=tcp/1' is not a station; it reads NAME=tcp/"),
         (["--config", "nowhere.toml"], "nowhere.toml: there is no such file"),
     ],
 )
@@ -395,10 +395,10 @@ def test_what_cannot_be_done_is_refused_before_it_begins(
     [
         (["export", "."], ".: is a directory"),
         (["export", "/"], "/: is a directory"),
-        (["session", "pack", "afile", "--output", "afile/a.zip"], "afile is no folder"),
+        (["session", "pack", "afile", "--output", "afile/a.zip"], "afile is not a folder"),
         (["new-device", "camera", "cam", "--out", "afile"], "cannot be written (Not a directory)"),
-        (["audit", "bytes.toml"], "bytes.toml: is no audit trail"),
-        (["audit", "afile"], "afile: is no audit trail"),
+        (["audit", "bytes.toml"], "bytes.toml: is not an audit trail"),
+        (["audit", "afile"], "afile: is not an audit trail"),
     ],
 )
 def test_a_path_that_cannot_be_used_is_named_in_a_line(

@@ -224,7 +224,7 @@ def test_a_folder_is_no_recording(folder):
 @pytest.mark.parametrize("name", ["x" * 300, "x" * 249])
 def test_what_is_no_name_of_a_file_is_refused_as_such(recorded, tmp_path, name):
     path, _ = recorded
-    with pytest.raises(RecordingError, match=r"is no name of a file|cannot be written"):
+    with pytest.raises(RecordingError, match=r"is not the name of a file|cannot be written"):
         export_file(path, "csv", tmp_path / f"{name}.csv")
 
 
@@ -232,5 +232,5 @@ def test_a_name_too_long_for_a_file_is_refused_as_such_wherever_it_stands(record
     path, _ = recorded
     with pytest.raises(RecordingError, match="cannot be read"):
         export_file("x" * 3000, "csv", tmp_path / "made.csv")
-    with pytest.raises(RecordingError, match="is no name of a file"):
+    with pytest.raises(RecordingError, match="is not the name of a file"):
         export_file(path, "csv", tmp_path / ("x" * 300) / "made.csv")

@@ -153,7 +153,7 @@ def test_one_of_another_computer_is_left_alone_until_somebody_answers_for_it(
 def test_the_number_of_a_process_that_was_given_again_does_not_deceive(
     killed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cosmic.frame.process_mark.process_start", lambda _: "this boot:later")
+    monkeypatch.setattr("cosmic.frame.file_holder.process_start", lambda _: "this boot:later")
     assert close_left_open(killed).outcome is Outcome.CLOSED
 
 
@@ -235,8 +235,8 @@ def overwritten(path: Path) -> None:
     ("harm", "message"),
     [
         (nothing, "No such file"),
-        (text, "is no recording by CoSMic; nothing was changed"),
-        (foreign, "no recording by CoSMic"),
+        (text, "is not a recording by CoSMic; nothing was changed"),
+        (foreign, "not a recording by CoSMic"),
         (foreign_and_open, "h5clear"),
         (cut_short, "damaged beyond what can be mended, and nothing was changed"),
         (overwritten, "damaged beyond what can be mended, and nothing was changed"),

@@ -497,7 +497,7 @@ def test_a_missing_file_and_a_foreign_one_are_distinguished(tmp_path):
         open_recording(tmp_path / "none.h5")
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["data"] = 1
-    with pytest.raises(RecordingError, match="no recording by CoSMic"):
+    with pytest.raises(RecordingError, match="not a recording by CoSMic"):
         open_recording(tmp_path / "other.h5")
 
 

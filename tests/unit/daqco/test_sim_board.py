@@ -12,7 +12,6 @@ from typing_extensions import override
 from cosmic.daqco.hw.board_group import BoardGroup
 from cosmic.daqco.hw.interface import BoardChunk, InputMode, InputSettings
 from cosmic.daqco.hw.sim_board import SimulatedBoard
-from cosmic.daqco.hw.sim_fast import FastLibrary
 from cosmic.daqco.hw.sim_library import PCI_6229, SimulatedLibrary
 from cosmic.frame.clock import ManualClock, RatedClock
 from cosmic.frame.errors import (
@@ -22,6 +21,7 @@ from cosmic.frame.errors import (
     LimitError,
     NotConnectedError,
 )
+from cosmic.testing.fast_board import FastLibrary
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import shipped_settings
 

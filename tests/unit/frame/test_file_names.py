@@ -41,15 +41,6 @@ def test_the_number_follows_the_highest_in_use(tmp_path):
     assert file_name("f(1)", NameOption.NUMBER, directory=tmp_path) == "f(1)_001.h5"
 
 
-def test_a_number_is_in_use_by_any_of_the_endings_given(tmp_path):
-    for name in ("fibre_002.csv", "fibre_004.txt", "fibre_007"):
-        (tmp_path / name).touch()
-    wanted = {"suffix": ".mkv", "directory": tmp_path}
-    number = NameOption.NUMBER
-    assert named("fibre", number, **wanted, taken_by=(".csv", ".avi")) == "fibre_003.mkv"
-    assert named("fibre", number, **wanted, taken_by=(".csv", "")) == "fibre_008.mkv"
-
-
 def test_numbering_in_a_missing_directory_begins_at_one(tmp_path):
     name = file_name("fibre", NameOption.NUMBER, directory=tmp_path / "none")
     assert name == "fibre_001.h5"

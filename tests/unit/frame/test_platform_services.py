@@ -16,6 +16,7 @@ import pytest
 from cosmic.frame import platform_services
 from cosmic.frame.clock import RatedClock
 from cosmic.frame.errors import NotAvailable
+from cosmic.frame.file_holder import FileHold, Life, ProcessMark, own_mark
 from cosmic.frame.platform_services import (
     end_process_after,
     ending_signals,
@@ -26,7 +27,6 @@ from cosmic.frame.platform_services import (
     sync_folder,
     tick_finely,
 )
-from cosmic.frame.process_mark import FileHold, Life, ProcessMark, own_mark
 from cosmic.frame.windows_api import Overlapped, PowerThrottling, WindowsApi, load_windows_api
 
 BEYOND_ANY_FILE = 1 << 62

@@ -16,8 +16,8 @@ from cosmic.mico.hw.input_sources import InputSources
 from cosmic.mico.hw.keyboard_input import KeyboardSource
 from cosmic.mico.hw.recorded_input import InputEvent, RecordedInput, read_events
 from cosmic.mico.hw.sdl_input import PAD_AXES, SdlSource
-from cosmic.mico.hw.sdl_virtual import VirtualGamepad
 from cosmic.mico.hw.sim_haptic import FORCE_N, SimHapticSource
+from cosmic.testing.virtual_gamepad import VirtualGamepad
 
 
 @pytest.fixture

@@ -84,7 +84,7 @@ def test_a_library_over_a_scene_takes_its_wiring_and_clock() -> None:
         (("stages", "left.x", "start"), 6001.0, "outside its travel"),
         (("stages", "left.x", "kind"), "hexapod", "unknown kind"),
         (("devices", 0, "channels"), ["left.x", "left.x", ""], "wired twice"),
-        (("devices", 0, "channels"), ["left.x", "nobody", ""], "no stage"),
+        (("devices", 0, "channels"), ["left.x", "nobody", ""], "not a stage"),
         (("devices", 0, "channels"), ["left.x"], "channels"),
     ],
 )

@@ -6,7 +6,7 @@ import pytest
 
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import ConfigError
-from cosmic.twin.sample import put_on
+from cosmic.twin.sample_layout import put_on
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import shipped_settings
 from cosmic.twin.truth import TruthFile, read_truth
@@ -137,5 +137,5 @@ def test_what_is_no_truth_is_not_written_over(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="give another name"):
         written(notes)
     assert notes.read_text(encoding="utf-8") == "my notes\n"
-    with pytest.raises(ConfigError, match="is no file"):
+    with pytest.raises(ConfigError, match="is not a file"):
         written(tmp_path)

@@ -10,7 +10,7 @@ import pytest
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.fibre_tracking import FibreTracker
-from cosmic.vico.core.vision.matching import Template, displacement, drift_px
+from cosmic.vico.core.vision.matching import Template, displacement
 from cosmic.vico.core.vision.tracking import TemplateTracker, TrackState
 from cosmic.vico.hw.interface import Roi
 
@@ -68,14 +68,6 @@ def test_a_straight_edge_is_not_sure_along_itself() -> None:
     match = displacement(noisy[0], noisy[1], Roi(170, 100, 60, 60), 10.0)
     assert match is not None
     assert match.std_px > 0.5
-
-
-def test_the_drift_of_a_whole_image_is_found() -> None:
-    shift, clear = drift_px(scene(), scene((3.4, -6.2), seed=5))
-    assert shift == pytest.approx((3.4, -6.2), abs=0.1)
-    assert clear > 0.3
-    with pytest.raises(ConfigError, match="cannot be compared"):
-        drift_px(scene(), scene()[:200])
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,10 @@ import math
 import sys
 from typing import Final
 
-from cosmic.autonomy.campaign.statistics import TWO_SIDED, MeanEi, fibres_needed, progress
+from cosmic.autonomy.campaign.statistics import MeanEi, fibres_needed, progress
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.errors import ConfigError
+from cosmic.frame.units import TWO_SIDED
 
 USUAL: Final = (2.0, 5.0, 10.0, 20.0)
 

@@ -49,7 +49,7 @@ class HttpSettings(StrictModel):
         if not colon:
             host, port = self.listen, str(DEFAULT_PORT)
         if not port.isdecimal() or int(port) > 65_535 or not host:
-            raise ConfigError(f"HTTP: {self.listen!r} is no ADDRESS:PORT, such as 127.0.0.1:8470")
+            raise ConfigError(f"HTTP: {self.listen!r} is not ADDRESS:PORT, such as 127.0.0.1:8470")
         return host.strip("[]"), int(port)
 
 
@@ -129,7 +129,7 @@ def _check_address(host: str) -> None:
     except (OSError, UnicodeError) as exc:
         why = exc.strerror if isinstance(exc, OSError) else exc
         raise ConfigError(
-            f"HTTP: {host!r} is no address ({why}); give ADDRESS:PORT, such as 127.0.0.1:8470"
+            f"HTTP: {host!r} is not an address ({why}); give ADDRESS:PORT, such as 127.0.0.1:8470"
         ) from exc
 
 

@@ -71,7 +71,7 @@ def _object(said: bytes) -> dict[str, Any]:
     try:
         found = json.loads(said)
     except (ValueError, RecursionError) as exc:
-        raise HttpError(400, f"what came is no JSON: {str(exc)[:100]}") from exc
+        raise HttpError(400, f"what came is not JSON: {str(exc)[:100]}") from exc
     if not isinstance(found, dict):
         raise HttpError(400, "arguments are a JSON object, by their names")
     return found

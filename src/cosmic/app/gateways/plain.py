@@ -104,7 +104,7 @@ def _plain(value: object, annotation: Any) -> object:
         try:
             return float(value)
         except OverflowError:
-            raise CallRefused("a number beyond all floats is no number") from None
+            raise CallRefused("a number beyond all floats is not a number") from None
     return _same(value, type(value) is annotation, annotation)
 
 
@@ -123,7 +123,7 @@ def _text(value: object, annotation: Any) -> object:
 
 def _items(value: object) -> list[Any]:
     if not isinstance(value, list):
-        raise CallRefused(f"{_short(value)} is no list")
+        raise CallRefused(f"{_short(value)} is not a list")
     return value
 
 
@@ -137,7 +137,7 @@ def _generic(value: object, annotation: Any, origin: Any) -> object:
         try:
             return np.asarray(_items(value), dtype=np.float64)
         except (ValueError, TypeError) as exc:
-            raise CallRefused(f"a list that is no array came: {exc}") from exc
+            raise CallRefused(f"a list that is not an array came: {exc}") from exc
     if origin is tuple:
         items = _items(value)
         if len(inner) == 2 and inner[1] is Ellipsis:

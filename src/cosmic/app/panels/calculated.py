@@ -50,7 +50,7 @@ class Calculation:
             self._tree = ast.parse(self.formula, mode="eval").body
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise ConfigError(
-                f"{self.formula!r} is no formula, such as force - 2 * spare"
+                f"{self.formula!r} is not a formula, such as force - 2 * spare"
             ) from None
         names: set[str] = set()
         self._check(self._tree, names)

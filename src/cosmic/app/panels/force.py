@@ -166,7 +166,9 @@ class ForcePanel(QWidget):
         click_once(self.record)
         self.record.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.record.clicked.connect(self._on_record)
-        self.tare = styled(named(push_button("Tare", "Call the force now zero"), "tare"), "narrow")
+        self.tare = styled(
+            named(push_button("Tare", "Set the present force to zero"), "tare"), "narrow"
+        )
         self.tare.clicked.connect(self.take_zero)
         self.mark = styled(named(push_button("Mark", "Write a mark (Ctrl+M)"), "mark"), "narrow")
         self.mark.setShortcut("Ctrl+M")
@@ -500,13 +502,13 @@ class ForcePanel(QWidget):
             )
             return
         if value is None or self._age_s():
-            text = "the newest force is old: wait for the next"
-            self._say(text, "the force is old: wait", refused=True)
+            text = "the last force value is too old: wait for the next one"
+            self._say(text, "the force value is too old: wait", refused=True)
             return
         sides = (limit.settings.low, limit.settings.high) if limit is not None else ()
         least = min((abs(each) for each in sides if each is not None), default=math.inf)
         if abs(value) > TARE_SHARE * least:
-            text = f"{value:.0f} is a load, no zero: take the tool off the fibre first"
+            text = f"{value:.0f} is a load, not zero: take the tool off the fibre first"
             self._say(text, f"{value:.0f} is a load: take the tool off", refused=True)
             return
         channel = self._channel

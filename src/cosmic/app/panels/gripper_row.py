@@ -2,18 +2,15 @@
 
 import math
 from collections.abc import Callable
-from typing import Final
 
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from cosmic.frame.gui.build import named, push_button, styled, tight_row
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX, number_font
+from cosmic.frame.units import TWO_SIDED
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.core.motion.positioner import PositionerState
-
-TWO_SIDED: Final = 1.96
-"""Standard deviations in half of a 95 % interval."""
 
 
 def opening_text(state: PositionerState) -> str:

@@ -39,10 +39,8 @@ class ImageBar(QWidget):
     ----------
     vico : Vico
         The application; lens and lamp may be missing.
-    cameras : sequence of str
-        Titles of the cameras, in order.
-    exposures : sequence of QWidget
-        The exposure field of each camera.
+    exposures : dict of str to QWidget
+        The exposure field of each camera, by its title and in order.
 
     Signals
     -------

@@ -15,6 +15,7 @@ from cosmic.app.panels.scene import ScenePanel
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.key_focus import ENTER_KEYS
 from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, ui_font
@@ -27,7 +28,6 @@ from cosmic.mico.gui.mico_widget import MicoWidget
 
 logger = logging.getLogger(__name__)
 
-_ENTER: Final = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 _MILLIMETRE_UM: Final = 1000.0
 _TENTHS_BELOW_S: Final = 10.0
 _AT_START: Final = 1.0
@@ -164,7 +164,7 @@ class PathPreview(QWidget):
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() not in _ENTER or event.isAutoRepeat():
+        if event.key() not in ENTER_KEYS or event.isAutoRepeat():
             super().keyPressEvent(event)
         elif self._cancel.hasFocus():
             self._cancel.click()

@@ -45,7 +45,7 @@ USUAL_STEP_DEG: Final = 1.0
 SAFE_SIDE: Final = 0.1
 """How far before the place that a refusal names an axis is sent, in its unit."""
 NOTHING_TO_UNDO: Final = (
-    "Not available: no movement of yours to take back; what an operation did is undone on its card"
+    "Not available: you have made no move to undo; what an operation did is undone on its card"
 )
 _DIRECTIONS: Final = ("x", "y", "z")
 _PLACES: Final = {"left": (1, 0), "right": (1, 2), "up": (0, 1), "down": (2, 1)}
@@ -149,8 +149,8 @@ class ToolPanel(QWidget):
             self._group.addButton(button)
             self.choices[name] = button
         self.step = named(StepField("um", value=USUAL_STEP_UM, name="Step of the pad"), "padStep")
-        self.smaller = styled(push_button("÷10", "A step of a tenth"), "narrow")
-        self.larger = styled(push_button("×10", "A step ten times as large"), "narrow")
+        self.smaller = styled(push_button("÷10", "Divide the step size by 10"), "narrow")
+        self.larger = styled(push_button("×10", "Multiply the step size by 10"), "narrow")
         self.smaller.clicked.connect(lambda: self._scale_step(0.1))
         self.larger.clicked.connect(lambda: self._scale_step(10.0))
         self.go = named(push_button("Go to", "Move to all targets, together"), "toolGo")
@@ -295,7 +295,7 @@ class ToolPanel(QWidget):
         shown = self._shown.get((part, direction))
         sign = _ARROWS[shown] if shown else _SIGNS.get((part, direction), text)
         where = f", {shown} in the picture" if shown else ""
-        held = f"; hold the key {key} to move on and on" if key else ""
+        held = f"; hold the key {key} to keep moving" if key else ""
         short = key if len(key) == 1 else ""
         button = named(push_button(f"{sign} {short}".strip(), ""), "padButton")
         tipped(button, f"Move {name} {text}{where} by the step{held}")

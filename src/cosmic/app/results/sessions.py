@@ -270,7 +270,7 @@ def write_about(folder: Path, about: About) -> None:
     except FileNotFoundError:
         document = tomlkit.document()
     except (ValueError, TOMLKitError) as exc:
-        raise OSError(f"{path} is no TOML and stays as it is: {exc}") from exc
+        raise OSError(f"{path} is not TOML and stays as it is: {exc}") from exc
     for each in fields(About):
         document[each.name] = getattr(about, each.name)
     write_whole(path, tomlkit.dumps(document))

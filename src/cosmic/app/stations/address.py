@@ -56,7 +56,7 @@ class StationAddress:
             return cls.known(name)
         if not (name and endpoint):
             raise ConfigError(
-                f"{text!r} is no station; it reads NAME=tcp/127.0.0.1:PORT or NAME=tls/HOST:PORT"
+                f"{text!r} is not a station; it reads NAME=tcp/127.0.0.1:PORT or NAME=tls/HOST:PORT"
             )
         return cls(name, endpoint)
 

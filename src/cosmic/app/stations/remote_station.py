@@ -139,7 +139,7 @@ class RemoteStation:
             )
         facts = self._connection.call(ITSELF, "facts")
         if not isinstance(facts, StationFacts):
-            raise ProtocolError(f"{self.name} at {self.endpoint} is no station of CoSMic")
+            raise ProtocolError(f"{self.name} at {self.endpoint} is not a station of CoSMic")
         self._facts = facts
         subscription = self._connection.subscribe(LEASE_TOPIC, Rule.ALL, self._on_lease)
         self._undo = [subscription.close, self._connection.presence(self._on_presence)]

@@ -13,8 +13,8 @@ from cosmic.app.panels.approvals import ApprovalsPanel
 from cosmic.app.panels.calibrations import CalibrationPanel, add_calibrations
 from cosmic.app.panels.campaign.dock import CAMPAIGN, CampaignDock, can_run
 from cosmic.app.panels.instruments import DAQCO, LENS, instruments_of
+from cosmic.app.panels.motion_tabs import TRAJECTORIES, MotionTabs
 from cosmic.app.panels.path_preview import PathController, PathPreview, PreviewState
-from cosmic.app.panels.procedures import TRAJECTORIES, ProcedurePanels
 from cosmic.app.panels.scene import ScenePanel
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
@@ -22,7 +22,7 @@ from cosmic.app.stations.host import StationHost
 from cosmic.app.windows.closing import Closing, Parking, what_is_lost
 from cosmic.app.windows.coaching import coach_rules
 from cosmic.app.windows.hint_bar import HintBar, first_steps
-from cosmic.app.windows.stations import WindowStations
+from cosmic.app.windows.station_controls import WindowStations
 from cosmic.app.windows.tasks import (
     FORCE,
     HANDLE,
@@ -108,7 +108,7 @@ class OperatorWindow(CosmicServerGui):
         self._rig = Rig(platform, source="window")
         self._mico = None if platform.mico is None else self._rig.mico
         self._console: ConsolePanel | None = None
-        self._procedures: ProcedurePanels | None = None
+        self._motion_tabs: MotionTabs | None = None
         self._mico_gui: MicoWidget | None = None
         self._scene: ScenePanel | None = None
         self._path: PathController | None = None
@@ -221,7 +221,7 @@ class OperatorWindow(CosmicServerGui):
         if self._mico_gui is None or self._scene is None:
             return
         beside = MICO if self._by_task else SCENE
-        self._procedures = ProcedurePanels(
+        self._motion_tabs = MotionTabs(
             self, self._mico_gui, self._scene, self._rig.control, beside=beside
         )
         if not can_run(self._platform):
@@ -341,9 +341,9 @@ class OperatorWindow(CosmicServerGui):
         return self._scene
 
     @property
-    def procedures(self) -> ProcedurePanels | None:
+    def motion_tabs(self) -> MotionTabs | None:
         """Trajectories, teleoperation and control loops, where MiCo is hosted."""
-        return self._procedures
+        return self._motion_tabs
 
     @property
     def tasks(self) -> TaskLayout | None:
@@ -551,8 +551,8 @@ class OperatorWindow(CosmicServerGui):
             self._campaign.shut_down()
         if self._calibrations is not None and self._calibrations.made is not None:
             self._calibrations.made.shut_down()
-        if self._procedures is not None:
-            self._procedures.shut_down()
+        if self._motion_tabs is not None:
+            self._motion_tabs.shut_down()
         if self._tasks is not None:
             self._tasks.shut_down()
         self._rig.close()

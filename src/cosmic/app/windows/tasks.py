@@ -18,7 +18,7 @@ from cosmic.app.panels.force import ForcePanel
 from cosmic.app.panels.history import HistoryPanel
 from cosmic.app.panels.image_bar import ImageBar
 from cosmic.app.panels.instruments import DAQCO, LENS, Instruments
-from cosmic.app.panels.procedures import CONTROL, TELEOPERATION, TRAJECTORIES
+from cosmic.app.panels.motion_tabs import CONTROL, TELEOPERATION, TRAJECTORIES
 from cosmic.app.panels.recorded import RECORDER, RecorderPanel
 from cosmic.app.panels.results.panel import ResultsPanel
 from cosmic.app.panels.scene import ScenePanel
@@ -350,7 +350,7 @@ class TaskLayout(QObject):
         in_scene = self.central_view.large == SCENE_TITLE
         problem = "" if in_scene else view.camera.calibration_problem
         if not problem and name not in view.camera.targets:
-            problem = f"the {name} is no tool that the image knows"
+            problem = f"the {name} is not a tool that the image knows"
         on = self._scene.moving if in_scene else bool(view.tools.target)
         if not in_scene and not on:
             self._scene.set_moving(False)  # Escape has put the tool away

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.autonomy.bending.result import Floats
+from cosmic.frame.arrays import Floats, Mask
 
 TERMS: Final = 7
 """Of the polynomial; the turning is nothing at the clamp."""
@@ -35,7 +35,6 @@ LONGEST_STEP_UM: Final = 20.0
 LEAST_COS: Final = 0.2
 TURNS: Final = 3
 
-Mask = npt.NDArray[np.bool_]
 Chords = tuple[Floats, npt.NDArray[np.complex128]]
 """Places along a fibre between which its chords change evenly, and the chords there.
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from cosmic.autonomy.bending.curved import NaturalShape
-from cosmic.autonomy.bending.result import Floats
+from cosmic.frame.arrays import Floats
 
 CELLS: Final = 160
 LEAST_PLACES: Final = 8

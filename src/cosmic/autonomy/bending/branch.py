@@ -6,12 +6,10 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from cosmic.autonomy.bending.result import BendingError, Floats
+from cosmic.autonomy.bending.result import BendingError
 from cosmic.autonomy.bending.span import Span
-
-Mask = npt.NDArray[np.bool_]
+from cosmic.frame.arrays import Floats, Mask
 
 LEAST_POINTS: Final = 6
 LEAST_OUT: Final = 4

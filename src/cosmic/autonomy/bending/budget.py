@@ -14,8 +14,9 @@ from cosmic.autonomy.bending.inference import (
     fixed_covariance,
     varied_covariance,
 )
-from cosmic.autonomy.bending.result import COMMON_SOURCES, Contribution, Floats, Kind
+from cosmic.autonomy.bending.result import COMMON_SOURCES, Contribution, Kind
 from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.frame.arrays import Floats
 
 EXCESS_SCATTER: Final = "scatter of the spans beyond what was foreseen"
 """By what the interval is wider where readings scatter more than foreseen."""

@@ -23,8 +23,9 @@ from cosmic.autonomy.bending.inference import (
     varied_covariance,
 )
 from cosmic.autonomy.bending.population import Assessed
-from cosmic.autonomy.bending.result import BendingResult, Floats, Quality, SpanFit
+from cosmic.autonomy.bending.result import BendingResult, Quality, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.frame.arrays import Floats
 
 LEAST_SPANS: Final = 2
 LEAST_FOR_ONE_OUT: Final = 4
@@ -43,7 +44,6 @@ MOSTLY: Final = 0.6
 RELAXES_FROM: Final = 0.04
 RELAXES_MOST: Final = 0.16
 RUBS_FROM: Final = 0.35
-BEAM_POWER: Final = -3.0
 NO_BEAM_POWER: Final = -1.5
 BAD: Final = (
     Quality.SATURATED,
@@ -61,7 +61,7 @@ WORDS: Final = {
     "between spans",
     Quality.HINGE: "spans beyond one place are softer than those before: a weak place, or a kink",
     Quality.NON_UNIFORM: "the spans' stiffnesses do not follow one beam: the fibre is not uniform",
-    Quality.NOT_A_FIBRE: "stiffness does not fall with the length of the span: this is no fibre",
+    Quality.NOT_A_FIBRE: "stiffness does not fall with the length of the span: this is not a fibre",
     Quality.RELAXED: "the force relaxes so much that stiffness depends on how long one waits",
 }
 

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from cosmic.autonomy.bending.result import Floats
+from cosmic.frame.arrays import Floats
 
 RELAXED_AT_S: Final = 1.0
 """Each step counts from so long after it: stiffness is what a fibre shows then."""

@@ -16,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.autonomy.bending.balance import LOADS, PushedFibre, balanced
-from cosmic.autonomy.bending.result import BendingError, Floats
+from cosmic.autonomy.bending.result import BendingError
+from cosmic.frame.arrays import Floats, Mask
 
 DIRECTION_UM: Final = 40.0
 """Length to both sides of a place over which its direction is taken."""
@@ -26,8 +27,6 @@ MET_ENOUGH_PART: Final = 1e-3
 
 LEAST_SQUARE: Final = 0.2
 """Of what friction leaves of a push: with less the fibre is hardly pushed at all."""
-
-Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +86,7 @@ class NaturalShape:
                 "list of at least two of each is needed"
             )
         if not (np.isfinite(ahead).all() and np.isfinite(aside).all()):
-            raise BendingError("the fibre's shape holds values that are no numbers")
+            raise BendingError("the fibre's shape holds values that are not numbers")
         if not (np.diff(ahead) > 0.0).all() or not ahead[0] < self.at_um <= ahead[-1]:
             raise BendingError(
                 f"the fibre's shape must rise along the jaws up to the probe at {self.at_um:g} um"

@@ -42,10 +42,10 @@ from cosmic.autonomy.bending.standards import (
     check_standards,
     scale_of,
 )
+from cosmic.frame.units import TWO_SIDED
 
 NEAR: Final = 0.03
 """Of friction: what spans were fitted about stands for so much more and less."""
-NORMAL_95: Final = 1.96
 MET_STD_UM: Final = 1.0
 """Of where the probe met the fibre, by the rise of the force."""
 LEAST_RUB, MOST_RUB = 0.02, 0.8
@@ -398,7 +398,7 @@ def _as_read(
     """Return the stiffness that the sensor, by its own scale, has read of a standard."""
     if certificate is None or not math.isfinite(reading.off_part):
         return result
-    ei, std = certificate.ei_n_m2 * math.exp(reading.off_part), NORMAL_95 * reading.off_std_part
+    ei, std = certificate.ei_n_m2 * math.exp(reading.off_part), TWO_SIDED * reading.off_std_part
     return replace(
         result, ei_n_m2=ei, ei_low_n_m2=ei * math.exp(-std), ei_high_n_m2=ei * math.exp(std)
     )

@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 
 from cosmic.autonomy.bending.crept import NO_LOADS, Loads
-from cosmic.autonomy.bending.result import Floats
 from cosmic.autonomy.bending.span import Span
+from cosmic.frame.arrays import Floats
 
 UNKNOWN: Final = (math.nan, math.nan)
 READ_S: Final = 0.1

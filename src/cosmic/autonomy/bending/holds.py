@@ -12,7 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from cosmic.autonomy.bending.result import Floats, SpanFit
+from cosmic.autonomy.bending.result import SpanFit
+from cosmic.frame.arrays import Floats
 
 TWISTED: Final = 0.25
 """Of what friction does to a section askew: the part that differs between spans, by twist; it may

@@ -16,8 +16,9 @@ from scipy.special import chdtrc, ndtr
 
 from cosmic.autonomy.bending.holds import TWISTED, UNKNOWN_HOLDS, Holds
 from cosmic.autonomy.bending.response import LaidOut, Response
-from cosmic.autonomy.bending.result import COMMON_SOURCES, Floats, SpanFit
+from cosmic.autonomy.bending.result import COMMON_SOURCES, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.frame.arrays import Floats
 
 DEPTHS: Final = 36
 SHALLOWEST_UM, DEEPEST_UM = 1.5, 240.0

@@ -111,7 +111,7 @@ def plan_spans(
             f"{limits.shortest_um:g} um, and {limits.beyond_um:g} um must remain beyond the probe"
         )
     if not 0.0 < ei_guess_n_m2 < math.inf:
-        raise BendingError(f"{ei_guess_n_m2:g} N m2 is no bending stiffness to plan with")
+        raise BendingError(f"{ei_guess_n_m2:g} N m2 is not a bending stiffness to plan with")
     ei = ei_guess_n_m2 * UN_UM2_PER_N_M2
     # At a push of stroke_part * span the force is 3 EI stroke_part / span^2.
     enough = math.sqrt(3.0 * ei * limits.stroke_part / limits.wanted_un)

@@ -30,8 +30,8 @@ from cosmic.autonomy.bending.inference import (
     posterior_of,
     varied_covariance,
 )
-from cosmic.autonomy.bending.result import Floats
 from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.frame.arrays import Floats
 
 MIDDLES: Final = 13
 SPREADS: Final = np.array([0.15, 0.3, 0.45, 0.65, 0.9])

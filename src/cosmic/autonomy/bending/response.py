@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.autonomy.bending.curved import NaturalShape
-from cosmic.autonomy.bending.result import BendingError, Floats
+from cosmic.autonomy.bending.result import BendingError
+from cosmic.frame.arrays import Floats
 
 CELLS: Final = 48
 TURNED_RAD: Final = 0.01

@@ -5,17 +5,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-import numpy as np
-import numpy.typing as npt
-
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.renamed import renamed_fields
 
 UN_UM2_PER_N_M2: Final = 1e18
 N_M2_PER_UN_UM2: Final = 1e-18
-
-
-Floats = npt.NDArray[np.float64]
 
 
 class BendingError(CosmicError):

@@ -7,9 +7,8 @@ import numpy.typing as npt
 
 from cosmic.autonomy.bending.bent_shape import BentShape
 from cosmic.autonomy.bending.curved import NaturalShape
+from cosmic.frame.arrays import Floats
 from cosmic.frame.renamed import renamed_fields
-
-Floats = npt.NDArray[np.float64]
 
 
 @renamed_fields(way_um="probe_um")

@@ -10,7 +10,6 @@ from scipy.special import chdtrc  # scipy.stats takes a second to load
 
 from cosmic.autonomy.bending.branch import (
     CLEAR_SIGMAS,
-    Mask,
     Points,
     Rough,
     back_and_forth_percent,
@@ -27,9 +26,10 @@ from cosmic.autonomy.bending.crept import Loads, lost
 from cosmic.autonomy.bending.curved import NaturalShape, OutAndBack, PushedCurve, curves_of
 from cosmic.autonomy.bending.freed import freed_of
 from cosmic.autonomy.bending.response import straight
-from cosmic.autonomy.bending.result import Floats, Quality, SpanFit
+from cosmic.autonomy.bending.result import Quality, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
+from cosmic.frame.arrays import Floats, Mask
 
 ROUNDS: Final = 2
 ENOUGH: Final = 1e-8

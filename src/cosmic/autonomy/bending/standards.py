@@ -18,8 +18,8 @@ from scipy.special import chdtrc
 
 from cosmic.autonomy.bending.inference import DRIFT, GAIN, Common, Readings, common_prior
 from cosmic.autonomy.bending.population import said_alone
-from cosmic.autonomy.bending.result import Floats
 from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.frame.arrays import Floats
 
 UNKNOWN_GAIN: Final = 0.5
 """Standard deviation of a scale of which nothing is known."""

@@ -214,7 +214,9 @@ class CalibrationRegistry:
         wrong = [name for name, value in numbers.items() if not math.isfinite(value)]
         if wrong:
             names = ", ".join(wrong)
-            raise ConfigError(f"{entry.name} of {entry.tool}: {names}: no number; measure it again")
+            raise ConfigError(
+                f"{entry.name} of {entry.tool}: {names}: not a number; measure it again"
+            )
         with self._lock:
             self._known[entry.key] = replace(entry, session=self.session, version=self.version)
         self._write(entry.key)

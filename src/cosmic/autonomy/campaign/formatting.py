@@ -7,15 +7,13 @@ from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.standards import ForceScale
 from cosmic.autonomy.campaign.records import FibreRecord, Shape
 from cosmic.autonomy.campaign.statistics import MeanEi
+from cosmic.frame.units import TWO_SIDED
 
 EI_UNIT: Final = 1e-12
 EI_LABEL: Final = "10⁻¹² N m²"
 NONE: Final = "–"
 LEAST_SHARE: Final = 0.005
 """Of the variance: contributions with less stand together in one line."""
-
-TWO_SIDED: Final = 1.96
-"""Standard deviations in half of a 95 % interval."""
 
 
 def number(value: float, digits: int = 0) -> str:

@@ -271,7 +271,7 @@ def check_folder(folder: Path) -> None:
     except (OSError, ValueError) as exc:
         raise CampaignError(f"{folder} cannot be made: {exc}; name another folder") from exc
     if not there.is_dir():
-        raise CampaignError(f"{folder}: {there} is no folder; name another folder")
+        raise CampaignError(f"{folder}: {there} is not a folder; name another folder")
     if not os.access(there, os.W_OK | os.X_OK):
         raise CampaignError(f"{folder}: {there} may not be written to; name another folder")
 

@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.span import Span
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.renamed import Renamed
 
-Floats = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 Value = str | int | float | bool | None
 

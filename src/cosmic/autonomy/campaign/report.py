@@ -72,6 +72,7 @@ from cosmic.autonomy.campaign.statistics import (
 from cosmic.autonomy.campaign.store import CampaignStore, write_whole
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.campaign.svg_plot import bars
+from cosmic.frame.units import TWO_SIDED
 
 ShowSvg = Callable[[str, int], str]
 """Returns the element that shows an SVG, so many pixels wide."""
@@ -471,7 +472,7 @@ def _span_rows(result: BendingResult) -> list[tuple[str, ...]]:
     return [
         (
             f"{fit.place_um:.1f}",
-            f"{number(fit.k_un_um, 3)} ± {number(1.96 * fit.k_std_un_um, 3)}",
+            f"{number(fit.k_un_um, 3)} ± {number(TWO_SIDED * fit.k_std_un_um, 3)}",
             number(fit.k_loading_un_um, 3),
             number(fit.k_unloading_un_um, 3),
             number(100.0 * math.expm1(fit.off_model_log), 1),

@@ -6,15 +6,13 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from cosmic.autonomy.bending.result import BendingResult, SpanFit
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.campaign.formatting import budget_rows
-from cosmic.autonomy.campaign.records import FibreImage, FibreRecord, Floats, Outcome, Shape
+from cosmic.autonomy.campaign.records import FibreImage, FibreRecord, Outcome, Shape
 from cosmic.autonomy.campaign.statistics import CampaignProgress, MeanEi, mean_ei
-
-Mask = npt.NDArray[np.bool_]
+from cosmic.frame.arrays import Floats, Mask
 
 MOST_CONTRIBUTIONS: Final = 4
 LEAST_SHARE: Final = 0.03

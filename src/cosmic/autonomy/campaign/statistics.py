@@ -12,13 +12,13 @@ from scipy.special import stdtrit  # scipy.stats takes a second to load
 from cosmic.autonomy.bending.budget import combined_std_ln
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.campaign.records import FINISHED, FibreRecord, Outcome
+from cosmic.frame.units import TWO_SIDED
 
 MANY: Final = 10_000
 """Fibres from which on their spread is as good as known."""
 
 SECONDS_AN_HOUR: Final = 3600.0
 CONFIDENCE: Final = 0.975
-TWO_SIDED: Final = 1.96
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,9 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from cosmic.autonomy.campaign.statistics import TWO_SIDED, CampaignProgress, fibres_needed
+from cosmic.autonomy.campaign.statistics import CampaignProgress, fibres_needed
 from cosmic.frame.config import StrictModel
+from cosmic.frame.units import TWO_SIDED
 
 
 class StopSettings(StrictModel):

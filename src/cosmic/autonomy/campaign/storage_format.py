@@ -21,13 +21,13 @@ from cosmic.autonomy.campaign.records import (
     CampaignError,
     FibreImage,
     FibreRecord,
-    Floats,
     OperationRecord,
     Outcome,
     Pose,
     Series,
     Shape,
 )
+from cosmic.frame.arrays import Floats
 
 DATABASE: Final = "campaign.sqlite"
 FIBRES: Final = "fibres"

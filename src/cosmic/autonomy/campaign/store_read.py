@@ -62,7 +62,7 @@ class CampaignReader:
             It is not.
         """
         if not (self.folder / DATABASE).exists():
-            what = f"there is no {DATABASE} in it" if self.folder.is_dir() else "it is no folder"
+            what = f"there is no {DATABASE} in it" if self.folder.is_dir() else "it is not a folder"
             raise CampaignError(f"{self.folder} holds no campaign: {what}")
         version = self.version()
         if version == 0:

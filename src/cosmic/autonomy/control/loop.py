@@ -253,7 +253,7 @@ class ControlLoop(WorkerThread):
         if not now_s - since_s <= source.stale_s * (clock.rate or 1.0):
             raise _StaleError(f"no data of {source.name} for {source.stale_s:g} s")
         if sample is not None and not math.isfinite(sample.value):
-            raise _StaleError(f"{source.name} is no number")
+            raise _StaleError(f"{source.name} is not a number")
         return sample
 
     def _note(self, measured: float, answer: Answer) -> None:

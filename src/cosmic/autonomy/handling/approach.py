@@ -15,8 +15,8 @@ from cosmic.autonomy.handling.plate import along, arc_lengths
 from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen, trace_along
 from cosmic.autonomy.handling.tips import see_tip
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
+from cosmic.frame.arrays import Floats
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.pixel_map import Floats
 from cosmic.vico.core.vision.tool_types import GripperTips
 
 logger = logging.getLogger(__name__)

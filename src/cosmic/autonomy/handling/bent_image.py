@@ -9,8 +9,8 @@ import numpy.typing as npt
 from cosmic.autonomy.bending.bent_shape import BentShape
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.grasp import HeldShape
+from cosmic.frame.arrays import Floats
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.pixel_map import Floats
 from cosmic.vico.core.vision.algorithms import grey
 
 NEAR_JAWS_UM: Final = 70.0

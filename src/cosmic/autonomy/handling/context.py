@@ -23,13 +23,14 @@ from cosmic.autonomy.procedures.operation import OperationFailed, Steps, UnitOpe
 from cosmic.autonomy.procedures.waits import Resource
 from cosmic.autonomy.tools import axis_targets
 from cosmic.daqco.api.daqco import Daqco
+from cosmic.frame.arrays import Floats
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.vico import Vico
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.pixel_map import Floats, PixelMap
+from cosmic.vico.core.pixel_map import PixelMap
 from cosmic.vico.core.tool_settings import ToolSettings
 
 HEIGHTS: Final = "heights over the plate"

@@ -15,8 +15,8 @@ from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import along, arc_lengths
 from cosmic.autonomy.handling.sight import trace_along
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps, Yielded
+from cosmic.frame.arrays import Floats
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.pixel_map import Floats
 
 TANGENT_UM: Final = 120.0
 """Length to both sides of the jaws' tip from which the direction there is taken."""

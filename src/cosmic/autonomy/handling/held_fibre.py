@@ -9,8 +9,8 @@ from cosmic.autonomy.handling.plate import Reach
 from cosmic.autonomy.handling.sight import SeenFibre
 from cosmic.autonomy.handling.surface import Contact
 from cosmic.autonomy.procedures.operation import OperationFailed
+from cosmic.frame.arrays import Floats
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.pixel_map import Floats
 
 
 @dataclass(slots=True, eq=False)

@@ -12,9 +12,9 @@ from cosmic.autonomy.handling.plate import along
 from cosmic.autonomy.handling.sight import trace_along
 from cosmic.autonomy.handling.tips import see_tip
 from cosmic.autonomy.tools import tip_um
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.pixel_map import Floats
 from cosmic.vico.core.vision.tool_types import GripperTips
 
 BEGIN_UM: Final = 60.0

@@ -10,9 +10,9 @@ from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.plate import Candidate, Reach
 from cosmic.autonomy.handling.survey import Choose, approaches_of
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.pixel_map import Floats
 
 NOT_MARKED = "not the fibre marked"
 NEAR_UM = 150.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from cosmic.autonomy.handling.plate_obstacles import ROOM_UM, any_under
 from cosmic.autonomy.handling.settings import GraspSettings
-from cosmic.vico.core.pixel_map import Floats
+from cosmic.frame.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)

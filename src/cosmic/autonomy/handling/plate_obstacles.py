@@ -5,11 +5,11 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import NotAvailable
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.collision.kinematics import body_poses
 from cosmic.mico.core.collision.model import JointKind, SceneModel
-from cosmic.vico.core.pixel_map import Floats
 
 ROOM_UM: Final = 300.0
 """Jaws keep off by so much: a fibre is tested, shaken and wiped off some way beside its place."""

@@ -9,12 +9,13 @@ from typing import Final
 import numpy as np
 
 from cosmic.autonomy.coordinate_transform import PlatformTransform
+from cosmic.frame.arrays import Floats
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, DeviceTimeout, NotAvailable
 from cosmic.frame.operation import Task
 from cosmic.vico.api.camera import CameraHandle
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.pixel_map import Floats, PixelMap
+from cosmic.vico.core.pixel_map import PixelMap
 from cosmic.vico.core.vision.algorithms import grey
 from cosmic.vico.core.vision.fibre import Fibre
 

@@ -16,9 +16,9 @@ from cosmic.autonomy.handling.prepare import clear_image
 from cosmic.autonomy.handling.settings import GraspSettings, StandardSettings
 from cosmic.autonomy.handling.sight import SeenFibre, find_seen
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import MoveRefused, StoppedError
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.pixel_map import Floats
 
 logger = logging.getLogger(__name__)
 

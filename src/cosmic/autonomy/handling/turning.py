@@ -13,10 +13,10 @@ from cosmic.autonomy.handling.plate import Candidate, PlateFrame
 from cosmic.autonomy.handling.prepare import TABLE, clear_image
 from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps, Yielded
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.calibration_fit import CalibrationRefused, RotationFit, fit_rotation
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.pixel_map import Floats
 
 STEP_DEG: Final = 20.0
 ANGLES: Final = 6

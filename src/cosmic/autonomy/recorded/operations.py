@@ -15,9 +15,9 @@ from typing_extensions import override
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.force import ForceMean, ForceWatch
 from cosmic.autonomy.handling.jaws import move_jaws
+from cosmic.autonomy.handling.manual_operations import PushToForce
 from cosmic.autonomy.handling.marked import MarkedFibre
 from cosmic.autonomy.handling.prepare import make_safe
-from cosmic.autonomy.handling.single_operations import PushToForce
 from cosmic.autonomy.procedures.combinators import Sequence
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.autonomy.procedures.procedure import Part, Procedure
@@ -37,18 +37,18 @@ from cosmic.autonomy.recorded.steps import (
     WaitForForceStep,
     WaitForOperatorStep,
 )
-from cosmic.autonomy.shipped.single_operation import SingleOperation
-from cosmic.autonomy.shipped.single_procedures import (
+from cosmic.autonomy.shipped.operation_procedures import (
     build_bring,
     build_measure,
     build_push,
     build_put_away,
     build_take,
 )
+from cosmic.autonomy.shipped.single_operation import SingleOperation
 from cosmic.daqco.api.daqco import Daqco
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import ConfigError, DeviceTimeout
 from cosmic.mico.core.motion.positioner import positions_of
-from cosmic.vico.core.pixel_map import Floats
 
 LOOK_S: Final = 0.05
 """Over which a force is averaged while it is waited for."""

@@ -45,7 +45,7 @@ class RecordedStep(StrictModel):
     def _asks_for_numbers(self) -> Self:
         for key in self.ask:
             if not isinstance(getattr(self, key, None), int | float):
-                raise ValueError(f"ask: {key!r} is no number of this step")
+                raise ValueError(f"ask: {key!r} is not a number of this step")
         return self
 
     @property

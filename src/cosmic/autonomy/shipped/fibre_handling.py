@@ -11,12 +11,23 @@ from typing_extensions import override
 from cosmic.autonomy.coordinate_transform import NO_TABLE
 from cosmic.autonomy.handling.context import Applications, HandlingContext, vision_of
 from cosmic.autonomy.handling.held_fibre import HeldFibre
+from cosmic.autonomy.handling.manual_operations import CloseGently, PushToForce, is_at_probe
 from cosmic.autonomy.handling.marked import MarkedFibre, approach_to
 from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.handling.single_operations import CloseGently, PushToForce, is_at_probe
 from cosmic.autonomy.procedures.failures import STOPPED
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun, RunState
+from cosmic.autonomy.shipped.operation_procedures import (
+    build_bring,
+    build_carry_back,
+    build_close_gently,
+    build_lay_back,
+    build_measure,
+    build_push,
+    build_put_away,
+    build_retract,
+    build_take,
+)
 from cosmic.autonomy.shipped.single_operation import (
     IN_DOUBT,
     PUSHES,
@@ -31,17 +42,6 @@ from cosmic.autonomy.shipped.single_operation import (
 
 # Recorded procedures that were written as scripts take it from here.
 from cosmic.autonomy.shipped.single_operation import SingleOperation as SingleOperation
-from cosmic.autonomy.shipped.single_procedures import (
-    build_bring,
-    build_carry_back,
-    build_close_gently,
-    build_lay_back,
-    build_measure,
-    build_push,
-    build_put_away,
-    build_retract,
-    build_take,
-)
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.events import Event, Unsubscribe
 from cosmic.mico.api.application import MicoApplication

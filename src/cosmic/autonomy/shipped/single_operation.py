@@ -10,8 +10,8 @@ from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.campaign.formatting import EI_LABEL, interval, stiffness, with_interval
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.held_fibre import HeldFibre
+from cosmic.autonomy.handling.manual_operations import CloseGently, PushToForce
 from cosmic.autonomy.handling.marked import MarkedFibre
-from cosmic.autonomy.handling.single_operations import CloseGently, PushToForce
 from cosmic.autonomy.procedures.failures import STOPPED, ProcedureAborted, ProcedureStopped
 from cosmic.autonomy.procedures.run import ProcedureRun
 

@@ -14,7 +14,6 @@ from PySide6.QtCore import Qt
 from typing_extensions import override
 
 from cosmic.daqco.api.application import DaqcoApplication
-from cosmic.daqco.api.channel_shape import ChannelHandle
 from cosmic.daqco.api.files import (
     EXPORTS,
     RECORDINGS,
@@ -24,6 +23,7 @@ from cosmic.daqco.api.files import (
     recordings_in,
 )
 from cosmic.daqco.api.limit_watch import LimitWatch
+from cosmic.daqco.api.plan_channel import ChannelHandle
 from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.chunk import DataChunk, missing_samples
 from cosmic.daqco.core.display_pieces import DISPLAY_S, DisplayPieces

@@ -230,7 +230,7 @@ def _check_free(recording: Recording, path: Path, *, overwrite: bool) -> None:
         folder, there = path.parent.is_dir(), path.exists()
     except OSError as exc:
         raise RecordingError(
-            f"{str(path)[:80]}: is no name of a file ({exc.strerror}); choose another"
+            f"{str(path)[:80]}: is not the name of a file ({exc.strerror}); choose another"
         ) from exc
     if not folder:
         raise RecordingError(f"directory {path.parent} does not exist; create it or choose another")

@@ -69,7 +69,7 @@ class RecordingFolders:
         try:
             whole = (self._folders[0] / Path(text).expanduser()).resolve()
         except (OSError, ValueError, RuntimeError) as exc:
-            raise RecordingError(f"{text[:200]!r} is no path: {exc}") from exc
+            raise RecordingError(f"{text[:200]!r} is not a path: {exc}") from exc
         if not any(whole.is_relative_to(each) for each in self._folders):
             inside = ", ".join(str(each) for each in self._folders)
             raise RecordingError(

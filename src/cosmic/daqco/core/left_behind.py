@@ -29,8 +29,8 @@ from cosmic.daqco.core.unclosed_file import (
     missing_bytes,
 )
 from cosmic.frame.errors import RecordingError
+from cosmic.frame.file_holder import FileHold, Life, ProcessMark
 from cosmic.frame.kept_file import toml_lines, write_whole
-from cosmic.frame.process_mark import FileHold, Life, ProcessMark
 
 logger = logging.getLogger(__name__)
 
@@ -88,7 +88,7 @@ def close_left_open(path: Path, *, trusted: bool = False) -> Closing:
             with path.open("rb") as file:
                 head = file.read(LENGTH)
             if not is_recent(head):
-                raise RecordingError(f"{path}: is no recording by CoSMic; nothing was changed")
+                raise RecordingError(f"{path}: is not a recording by CoSMic; nothing was changed")
             if not is_unclosed(path):
                 hold.take(alone=False)
                 _contents(path)
@@ -104,8 +104,8 @@ def close_left_open(path: Path, *, trusted: bool = False) -> Closing:
 def _check_is_recording(path: Path, file: h5py.File) -> None:
     if file.attrs.get("format") != form.FORMAT:
         raise _cut_off(path) or RecordingError(
-            f"{path}: is an HDF5 file, but no recording by CoSMic; nothing was changed. HDF5's own "
-            "h5clear --status closes such files"
+            f"{path}: is an HDF5 file, but not a recording by CoSMic; nothing was changed. "
+            "HDF5's own h5clear --status closes such files"
         )
 
 

@@ -344,7 +344,7 @@ class OutputControl(WorkerThread):
     def _check_volts(self, each: OutputSettings, low_v: float, high_v: float) -> None:
         assert each.low_v is not None and each.high_v is not None
         if not (math.isfinite(low_v) and math.isfinite(high_v)):
-            text = f"output {each.name}: a voltage is no finite number; nothing was written"
+            text = f"output {each.name}: a voltage is not a finite number; nothing was written"
             raise refusal(refuse(Reason.NOT_FINITE, text, axis=each.name))
         if not each.low_v <= low_v <= high_v <= each.high_v:
             wrong = low_v if low_v < each.low_v else high_v
@@ -399,5 +399,5 @@ def _checked(name: str, waveform: Waveform) -> Volts:
             f"output {name}: a waveform is a row of 1 to {MOST_SAMPLES} volts, not {volts.shape}"
         )
     if not (math.isfinite(waveform.rate_hz) and waveform.rate_hz > 0.0):
-        raise ArgumentError(f"output {name}: {waveform.rate_hz!r} Hz is no rate of a waveform")
+        raise ArgumentError(f"output {name}: {waveform.rate_hz!r} Hz is not a rate of a waveform")
     return volts

@@ -23,7 +23,7 @@ from cosmic.daqco.core.recording_format import (
 )
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.errors import RecordingError, RecordingExistsError
-from cosmic.frame.process_mark import FileHold, own_mark
+from cosmic.frame.file_holder import FileHold, own_mark
 
 BLOCK_S: Final = 0.5
 SMALLEST_BLOCK: Final = 256

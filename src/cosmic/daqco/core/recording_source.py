@@ -46,7 +46,7 @@ def open_file(path: Path) -> h5py.File:
     try:
         if file.attrs.get("format") != form.FORMAT:
             raise _cut_off(path) or RecordingError(
-                f"{path}: is an HDF5 file, but no recording by CoSMic"
+                f"{path}: is an HDF5 file, but not a recording by CoSMic"
             )
     except Exception:
         file.close()
@@ -218,7 +218,7 @@ class RecordingSource:
 
     def _broken(self, exc: Exception) -> RecordingError:
         return _cut_off(self.path) or RecordingError(
-            f"{self.path}: cannot be read ({form.reason(exc)}); it is no recording, or damaged "
+            f"{self.path}: cannot be read ({form.reason(exc)}); it is not a recording, or damaged "
             "beyond what its writer could prevent. Look for a copy"
         )
 

@@ -1,14 +1,10 @@
 """A dialog in which Enter judges the field it is pressed in, and nothing more."""
 
-from typing import Final
-
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QIcon, QKeyEvent
 from PySide6.QtWidgets import QDialog, QDialogButtonBox
 
+from cosmic.frame.gui.key_focus import ENTER_KEYS
 from cosmic.frame.overrides import override
-
-_ENTER: Final = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 class FieldDialog(QDialog):
@@ -16,7 +12,7 @@ class FieldDialog(QDialog):
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in _ENTER:
+        if event.key() in ENTER_KEYS:
             event.accept()
             return
         super().keyPressEvent(event)

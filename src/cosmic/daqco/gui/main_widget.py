@@ -19,11 +19,11 @@ from PySide6.QtWidgets import (
 from cosmic.daqco.api.daqco import Daqco, daqco_of
 from cosmic.daqco.gui.asking import Asking
 from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
-from cosmic.daqco.gui.export_dialog import StationExportDialog, export_kinds
 from cosmic.daqco.gui.file_widget import UDaqFileWidget
 from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.outputs_panel import OutputsPanel
 from cosmic.daqco.gui.plotter import UDaqPlotter
+from cosmic.daqco.gui.station_export_dialog import StationExportDialog, export_kinds
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.beside import open_beside

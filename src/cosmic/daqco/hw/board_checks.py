@@ -10,6 +10,8 @@ from cosmic.frame.verdict import Reason, refuse
 
 # NI's connectors carry blocks of sixteen: ai0 pairs with ai8, ai16 with ai24 (M Series manual).
 _BLOCK: Final = 16
+BUFFER_S: Final = 10.0
+"""So long a board keeps samples that nobody fetches."""
 
 
 def negative_input(info: BoardInfo, positive: str) -> str | None:
@@ -37,7 +39,7 @@ def range_in_force(info: BoardInfo, each: InputSettings) -> tuple[float, float]:
     """
     if not each.low_v < each.high_v:
         raise _limit(
-            f"{info.name}/{each.input}: {each.low_v:g} to {each.high_v:g} V is no range; "
+            f"{info.name}/{each.input}: {each.low_v:g} to {each.high_v:g} V is not a range; "
             f"low must lie below high",
             value=each.low_v,
             limit=each.high_v,

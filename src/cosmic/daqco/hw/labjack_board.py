@@ -11,7 +11,13 @@ from typing import Any, Final
 import numpy as np
 from typing_extensions import override
 
-from cosmic.daqco.hw.board_checks import check_chunk, check_inputs, check_rate, range_in_force
+from cosmic.daqco.hw.board_checks import (
+    BUFFER_S,
+    check_chunk,
+    check_inputs,
+    check_rate,
+    range_in_force,
+)
 from cosmic.daqco.hw.interface import (
     Board,
     BoardChunk,
@@ -32,7 +38,6 @@ logger = logging.getLogger(__name__)
 SKIPPED_V: Final = -9999.0
 """What LJM puts where the board had to skip scans (LJM_DUMMY_VALUE)."""
 SINGLE_ENDED: Final = 199
-BUFFER_S: Final = 10.0
 NOT_RUNNING: Final = (1303, 2620)
 """LJM and the board say that no stream runs."""
 _HIGH_V: Final = ("ai0", "ai1", "ai2", "ai3")

@@ -11,6 +11,7 @@ import numpy as np
 from nidaqmx.constants import AcquisitionType, Level, TaskMode, TerminalConfiguration, VoltageUnits
 from nidaqmx.errors import DaqError, Error
 
+from cosmic.daqco.hw.board_checks import BUFFER_S
 from cosmic.daqco.hw.interface import InputMode, InputSettings, OverrunError, Volts
 from cosmic.daqco.hw.nidaqmx_errors import TABLE, board_error
 from cosmic.daqco.hw.pulses import PulseTrain
@@ -18,7 +19,6 @@ from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout
 
 logger = logging.getLogger(__name__)
 
-BUFFER_S: Final = 10.0
 READ_TIMEOUT_S: Final = 1.0
 OVERWRITTEN: Final = -200279
 TERMINALS: Final = {

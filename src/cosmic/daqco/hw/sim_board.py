@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import override
 
-from cosmic.daqco.hw.board_checks import check_chunk, check_inputs, check_rate
+from cosmic.daqco.hw.board_checks import BUFFER_S, check_chunk, check_inputs, check_rate
 from cosmic.daqco.hw.interface import (
     Board,
     BoardChunk,
@@ -32,7 +32,6 @@ logger = logging.getLogger(__name__)
 
 TIMEBASE_HZ: Final = 20e6
 FIFO_SAMPLES: Final = 4095
-BUFFER_S: Final = 10.0
 
 LATE_S: Final = 0.04
 """So late may the receiver be, by the wall, before the platform's time waits for it."""

@@ -3,7 +3,7 @@
 from threading import Condition
 from typing import Final
 
-from cosmic.frame.errors import ArgumentError
+from cosmic.frame.arguments import check_fault
 
 NAMES: Final = ("unplugged", "reserved", "stalled", "overrun", "no_driver")
 _ONCE: Final = ("overrun",)
@@ -35,7 +35,7 @@ class BoardFaults:
 
     def inject(self, name: str, *, board: str | None = None) -> None:
         """Put the fault `name` in force at one board, or at all; raises `ArgumentError`."""
-        _check_name(name)
+        check_fault(name, NAMES)
         with self.changed:
             self._active = (*self._active, (name, board))
             self.changed.notify_all()
@@ -43,7 +43,7 @@ class BoardFaults:
     def clear(self, name: str | None = None, *, board: str | None = None) -> None:
         """End the fault `name`, or all; with a board only what was injected there."""
         if name is not None:
-            _check_name(name)
+            check_fault(name, NAMES)
         with self.changed:
             self._active = tuple(
                 (what, where)
@@ -61,8 +61,3 @@ class BoardFaults:
                         self._active = tuple(each for each in self._active if each is not fault)
                 return True
         return False
-
-
-def _check_name(name: str) -> None:
-    if name not in NAMES:
-        raise ArgumentError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")

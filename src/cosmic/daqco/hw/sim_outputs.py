@@ -122,7 +122,7 @@ class SimulatedOutputs(BoardOutputs):
     levels : dict of str to OutputLevel
         By output; they stay when this is closed, as the voltages of a real board do.
     lines : dict of str to bool
-        By line; a rising line named in `line_terminals` is an edge at that terminal.
+        By line; one that rises is an edge at the terminal of its name.
     """
 
     def __init__(

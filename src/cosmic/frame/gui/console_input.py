@@ -6,12 +6,12 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QTextCursor
 from PySide6.QtWidgets import QPlainTextEdit, QSizePolicy, QWidget
 
+from cosmic.frame.gui.key_focus import ENTER_KEYS
 from cosmic.frame.gui.theme import STEP_PX, code_font
 from cosmic.frame.overrides import override
 
 _MOST_LINES: Final = 6
 _MOST_HISTORY: Final = 500
-_ENTER: Final = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 class ConsoleInput(QPlainTextEdit):
@@ -101,7 +101,7 @@ class ConsoleInput(QPlainTextEdit):
     def _is_handled(self, event: QKeyEvent) -> bool:
         key, modifiers = event.key(), event.modifiers()
         at = self.textCursor().blockNumber()
-        if key in _ENTER and not modifiers & Qt.KeyboardModifier.ShiftModifier:
+        if key in ENTER_KEYS and not modifiers & Qt.KeyboardModifier.ShiftModifier:
             self._submit()
         elif key == Qt.Key.Key_Tab:
             self._complete()

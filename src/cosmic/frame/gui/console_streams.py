@@ -68,7 +68,7 @@ class _Stream:
 
     def fileno(self) -> int:
         if self._is_mine() or self._original is None:
-            raise OSError("the console is no file")
+            raise OSError("the console is not a file")
         return self._original.fileno()
 
     def __getattr__(self, name: str) -> object:

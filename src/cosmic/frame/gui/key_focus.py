@@ -1,5 +1,8 @@
 """Who a key belongs to: the widget that text is typed into, or the program."""
 
+from typing import Final
+
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QAbstractSpinBox,
@@ -12,6 +15,9 @@ from PySide6.QtWidgets import (
     QTextEdit,
     QWidget,
 )
+
+ENTER_KEYS: Final = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+"""Enter of the letters and of the number pad."""
 
 
 def takes_text(widget: QWidget | None) -> bool:

@@ -15,13 +15,13 @@ from PySide6.QtWidgets import QLineEdit, QSizePolicy, QWidget
 
 from cosmic.frame.errors import QuantityError
 from cosmic.frame.gui.build import restyle, retip
+from cosmic.frame.gui.key_focus import ENTER_KEYS
 from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.reason_bubble import ReasonBubble
 from cosmic.frame.gui.theme import STEP_PX, State, current_palette, number_font, state_look
 from cosmic.frame.overrides import override
 from cosmic.frame.units import DISPLAY, format_quantity, parse_quantity, with_micro_signs
 
-_ENTER: Final = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 _KEEPS_EDITING: Final = (
     Qt.FocusReason.PopupFocusReason,
     Qt.FocusReason.ActiveWindowFocusReason,
@@ -244,7 +244,7 @@ class QuantityField(QLineEdit):
             event.accept()
             return
         super().keyPressEvent(event)
-        if event.key() in _ENTER and not event.isAutoRepeat() and self.commit():
+        if event.key() in ENTER_KEYS and not event.isAutoRepeat() and self.commit():
             self.selectAll()
             self.entered.emit(self._good)
 

@@ -207,7 +207,7 @@ def _general(host: str) -> x509.GeneralName:
         return x509.DNSName(host)
     except ValueError as exc:
         raise ConfigError(
-            f"{host!r} is no name of a computer: letters, digits, dots and hyphens, others as "
+            f"{host!r} is not the name of a computer: letters, digits, dots and hyphens, others as "
             "xn--..."
         ) from exc
 

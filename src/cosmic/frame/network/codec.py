@@ -79,7 +79,7 @@ def decode(message: bytes, limit_bytes: int = MESSAGE_LIMIT_BYTES) -> Any:
     if len(message) > limit_bytes:
         raise ProtocolError(f"a message of {len(message)} bytes came; {limit_bytes} are allowed")
     if len(message) < _PREFIX.size or message[0] != _MAGIC:
-        raise ProtocolError("something came that is no message of CoSMic")
+        raise ProtocolError("something came that is not a message of CoSMic")
     _, version, length = _PREFIX.unpack_from(message)
     if version != VERSION:
         raise ProtocolError(f"a message of version {version} came; this program speaks {VERSION}")

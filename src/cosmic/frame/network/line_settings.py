@@ -123,7 +123,7 @@ def _check_endpoint(endpoint: str, certificates: Certificates | None) -> None:
     host, _, port = address.rpartition(":")
     if protocol not in ("tcp", "tls") or not host or not port.isdecimal():
         raise ConfigError(
-            f"{endpoint!r} is no endpoint; it reads tcp/127.0.0.1:PORT or tls/HOST:PORT"
+            f"{endpoint!r} is not an endpoint; it reads tcp/127.0.0.1:PORT or tls/HOST:PORT"
         )
     if protocol == "tls":
         if certificates is None:

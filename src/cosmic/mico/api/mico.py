@@ -1057,4 +1057,4 @@ def mico_of(application: CosmicApplicationBase, source: str = "script") -> Mico:
         return Mico(application, source)
     if isinstance(application, RemoteMico):
         return application.mico(source)
-    raise TypeError(f"{application!r} is no MiCo")
+    raise TypeError(f"{application!r} is not a MiCo")

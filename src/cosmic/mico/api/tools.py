@@ -35,7 +35,7 @@ def _finite(name: str, numbers: Sequence[float]) -> Point:
     if len(numbers) == 3 and all(math.isfinite(each) for each in numbers):
         x_um, y_um, z_um = numbers
         return float(x_um), float(y_um), float(z_um)
-    text = f"{name}: {numbers!r} is no point: give x, y and z in um"
+    text = f"{name}: {numbers!r} is not a point: give x, y and z in um"
     raise refusal(refuse(Reason.NOT_FINITE, text))
 
 

@@ -72,7 +72,7 @@ class AxisCommands(QObject):
         It ended; the text says why, and is empty at its target.
     consent_wanted(ConsentRequest)
         It was refused for an unknown position only.
-    detour_requested(DetourRequest)
+    detour_wanted(DetourRequest)
         Something stands in its way, and a detour may be planned.
     noted(str)
         What to say of it meanwhile.

@@ -90,7 +90,7 @@ class AxisRow(QObject):
                 high=LARGEST_STEPS,
                 value=float(defaults.steps),
                 integers=True,
-                name=f"Steps of one click of {axis.key}",
+                name=f"Steps per click of {axis.key}",
             )
             return named(field, "rowStep")
         usual = defaults.distance_deg if axis.unit == "deg" else defaults.distance_um

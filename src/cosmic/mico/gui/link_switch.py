@@ -74,7 +74,7 @@ class LinkSwitch(QPushButton):
         self.setToolTip(f"{with_what}; press to unlink" if on else f"{self._axis} {OFF_TIP}")
         self.indicator.setText("●" if on else "○")
         self.indicator.setAccessibleName(f"linked with {others}" if on else "not linked")
-        tipped(self.indicator, with_what if on else f"{self._axis} is linked with none")
+        tipped(self.indicator, with_what if on else f"{self._axis} is not linked with another axis")
 
     def _on_clicked(self) -> None:
         if self._linked:
@@ -146,7 +146,7 @@ class LinkForm(Overlay):
         try:
             ratio = float(self.ratio.text().replace(",", "."))
         except ValueError:
-            self._refuse(f"{self.ratio.text()!r} is no number")
+            self._refuse(f"{self.ratio.text()!r} is not a number")
             return
         self.agreed.emit(self.other.currentText(), ratio)
         self.close()

@@ -134,7 +134,7 @@ class MappingTable(QTableWidget):
             value = _value(key, text)
         except ValueError:
             self.show_profile(profile)
-            self.refused.emit(f"{HEADS[column]}: {typed!r} is no number")
+            self.refused.emit(f"{HEADS[column]}: {typed!r} is not a number")
             return
         self.changed.emit(row, key, value)
 

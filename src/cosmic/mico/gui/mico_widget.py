@@ -95,7 +95,7 @@ class MicoWidget(QWidget):
         What was refused for that axis holds no longer: it has moved since.
     undo_planned(object)
         The poses that Undo leads through, while it is asked about or under way; None afterwards.
-    detour_requested(DetourRequest)
+    detour_wanted(DetourRequest)
         Something stands in the way of a move, while detours are planned.
     """
 
@@ -446,5 +446,5 @@ class MicoWidget(QWidget):
 def make_mico_gui(application: CosmicApplicationBase) -> MicoWidget:
     """Return the GUI component of a `MicoApplicationBase`; its `gui_factory`."""
     if not isinstance(application, MicoApplicationBase):
-        raise TypeError(f"{application!r} is no MicoApplication")
+        raise TypeError(f"{application!r} is not a MicoApplication")
     return MicoWidget(mico_of(application, "window"))

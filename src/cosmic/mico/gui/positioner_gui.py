@@ -33,7 +33,7 @@ class StepsPart(QWidget):
         self._axis = axis
         can = axis.details  # the ranges of its controller, which was asked for them
         most = (0, can.most_steps)
-        self.steps = _whole("MiCoOL_5", "steps", most, defaults.steps, "Steps of one click")
+        self.steps = _whole("MiCoOL_5", "steps", most, defaults.steps, "Steps per click")
         self.frequency = _whole(
             "MiCoOL_6", "Hz", can.frequency_range_hz, defaults.frequency_hz, "Steps per second"
         )

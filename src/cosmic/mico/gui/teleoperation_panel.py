@@ -52,7 +52,7 @@ class FineRow(QWidget):
         self.pace = QLabel("coarse")
         self._shown = ("", "")
         tips = (
-            (self.share, "fine share", "Part of the speed that fine leaves, 0 to 1"),
+            (self.share, "fine share", "Speed in fine mode, as a part of full speed, 0 to 1"),
             (self.button, "fine button", "Button that changes between fine and coarse"),
         )
         for edit, name, tip in tips:

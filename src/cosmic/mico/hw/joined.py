@@ -50,7 +50,7 @@ def _readdress(error: DeviceError, own: int, device: int) -> None:
 
 def _event(received: Event | None) -> Event | None:
     if received is not None and not isinstance(received, get_args(Event)):
-        raise TypeError(f"{received!r} is no event of a controller")
+        raise TypeError(f"{received!r} is not an event of a controller")
     return received
 
 

@@ -11,6 +11,10 @@ from ctypes import POINTER, c_int32, c_uint32, c_void_p
 from functools import cache
 from typing import Any, Final
 
+from typing_extensions import override
+
+from cosmic.mico.hw.smaract_load import SmaractFunctions
+
 
 class SA_PACKET(ctypes.Structure):
     """One answer of the asynchronous mode: 20 bytes without padding; all integers 32 bit."""
@@ -226,7 +230,7 @@ def python_function(name: str, pointer: Any) -> Any:
     return ctypes.PYFUNCTYPE(c_uint32, *PROTOTYPES[name])(address)
 
 
-class Scu3dLibrary:
+class Scu3dLibrary(SmaractFunctions):
     """The functions of one SCU3DControl library, each bound when it is first called.
 
     Parameters
@@ -239,20 +243,6 @@ class Scu3dLibrary:
     -----
     Any thread. An old library lacks functions; those answer like a device that lacks a command.
     """
-
-    def __init__(self, library: object) -> None:
-        self._library = library
-        self._bound: dict[str, Callable[..., int] | None] = {}
-
-    @property
-    def keeps_interpreter(self) -> bool:
-        """A call never lets another thread of Python in."""
-        in_python = getattr(self._library, "in_python", False)
-        return bool(getattr(self._library, "keeps_interpreter", in_python))
-
-    def has(self, name: str) -> bool:
-        """Return whether the library has the function `name`."""
-        return self._function(name) is not None
 
     def call(self, name: str, *args: object) -> int:
         """Call `name` and return its status; 129 (command not supported) where it is missing.
@@ -268,12 +258,7 @@ class Scu3dLibrary:
             function = self._function(name)
         return SA_COMMAND_NOT_SUPPORTED_ERROR if function is None else int(function(*args))
 
-    def _function(self, name: str) -> Callable[..., int] | None:
-        # Two threads may bind the same name at once; both make the same binding.
-        if name not in self._bound:
-            self._bound[name] = self._bind(name)
-        return self._bound[name]
-
+    @override
     def _bind(self, name: str) -> Callable[..., int] | None:
         prototype = function_type(name)
         if isinstance(self._library, ctypes.CDLL):

@@ -276,7 +276,7 @@ class Unit:
             return
         line = self._unanswered[0]
         if not self._fits(line, said):
-            logger.warning("%s: %r is no answer to %s", self.name, said, line.said)
+            logger.warning("%s: %r is not an answer to %s", self.name, said, line.said)
             return
         self._unanswered.popleft()
         self._missed = 0

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from threading import Lock
 from typing import Final, Protocol
 
+from cosmic.frame.arguments import check_fault
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ArgumentError
 
@@ -119,7 +120,7 @@ class Faults:
         ArgumentError
             No such fault, or a delay where none belongs.
         """
-        _check_name(name)
+        check_fault(name, NAMES)
         if delay_s is not None and name not in _WITH_DELAY:
             raise ArgumentError(f"fault {name!r} has no delay; those with one: {_WITH_DELAY}")
         if delay_s is not None and not 0.0 <= delay_s < 1e6:
@@ -142,7 +143,7 @@ class Faults:
             No such fault.
         """
         if name is not None:
-            _check_name(name)
+            check_fault(name, NAMES)
         with self._lock:
             ended = tuple(
                 fault
@@ -182,8 +183,3 @@ class Faults:
         """Return by how much answers are late there, s."""
         fault = self.find("slow_answer", device, channel) if self._active else None
         return fault.delay_s if fault is not None else 0.0
-
-
-def _check_name(name: str) -> None:
-    if name not in NAMES:
-        raise ArgumentError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")

@@ -36,8 +36,6 @@ from cosmic.twin.settings import shipped_settings
 logger = logging.getLogger(__name__)
 
 DEFAULT_LAYOUT: Final = "LLL,LLL,LLN,RNN"
-LIBRARY_V12: Final = "1.2.0"
-"""The library of 2010 with its 63 functions."""
 
 
 def load_simulated_library(

@@ -59,7 +59,7 @@ class PseudoTerminal(End):
         import tty
 
         if link.exists() and not link.is_symlink():
-            raise NotAvailable(f"{link} is there already, and is no link; name another")
+            raise NotAvailable(f"{link} is there already, and is not a link; name another")
         self._master, self._slave = os.openpty()
         # As a serial line: nothing is echoed, and no byte means anything. The near end stays open,
         # so that one program after the other can come.

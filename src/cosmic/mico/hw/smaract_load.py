@@ -1,12 +1,17 @@
-"""Finds and loads the libraries of SmarAct: SCU3DControl here, others by their description."""
+"""Finds and loads the libraries of SmarAct, and binds their functions by name.
+
+SCU3DControl is loaded here, others by their description.
+"""
 
 import ctypes
 import ctypes.util
 import struct
 import sys
+from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from cosmic.frame.errors import DeviceFault, NotConnectedError
 
@@ -81,6 +86,34 @@ SCU3D_CONTROL: Final = SmaractLibrary(
 def load_library(path: str = "") -> ctypes.CDLL:
     """Load SCU3DControl; see `SmaractLibrary.load`."""
     return SCU3D_CONTROL.load(path)
+
+
+class SmaractFunctions:
+    """The functions of one library, each bound when it is first called; any thread."""
+
+    def __init__(self, library: object) -> None:
+        self._library = library
+        self._bound: dict[str, Callable[..., Any] | None] = {}
+
+    @property
+    def keeps_interpreter(self) -> bool:
+        """A call never lets another thread of Python in."""
+        in_python = getattr(self._library, "in_python", False)
+        return bool(getattr(self._library, "keeps_interpreter", in_python))
+
+    def has(self, name: str) -> bool:
+        """Return whether the library has the function `name`."""
+        return self._function(name) is not None
+
+    def _function(self, name: str) -> Callable[..., Any] | None:
+        # Two threads may bind the same name at once; both make the same binding.
+        if name not in self._bound:
+            self._bound[name] = self._bind(name)
+        return self._bound[name]
+
+    @abstractmethod
+    def _bind(self, name: str) -> Callable[..., Any] | None:
+        """Return the function with its types, None where the library has none."""
 
 
 def _located(wanted: str) -> str:

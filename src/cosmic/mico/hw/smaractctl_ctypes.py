@@ -22,6 +22,10 @@ from ctypes import (
 from functools import cache
 from typing import Any, Final
 
+from typing_extensions import override
+
+from cosmic.mico.hw.smaract_load import SmaractFunctions
+
 
 class SA_CTL_EventValue(ctypes.Union):
     """What an event carries: a number of 32 or 64 bit."""
@@ -469,7 +473,7 @@ def function_type(name: str) -> Any:
     return ctypes.CFUNCTYPE(result_type(name), *PROTOTYPES[name])
 
 
-class SmaractCtlLibrary:
+class SmaractCtlLibrary(SmaractFunctions):
     """The functions of one SmarActCTL library, each bound when it is first called; any thread.
 
     Parameters
@@ -479,20 +483,6 @@ class SmaractCtlLibrary:
         One whose functions are Python says so by an attribute `in_python` that is true: a call
         then keeps the interpreter instead of winning it back.
     """
-
-    def __init__(self, library: object) -> None:
-        self._library = library
-        self._bound: dict[str, Callable[..., Any] | None] = {}
-
-    @property
-    def keeps_interpreter(self) -> bool:
-        """A call never lets another thread of Python in."""
-        in_python = getattr(self._library, "in_python", False)
-        return bool(getattr(self._library, "keeps_interpreter", in_python))
-
-    def has(self, name: str) -> bool:
-        """Return whether the library has the function `name`."""
-        return self._function(name) is not None
 
     def call(self, name: str, *args: object) -> int:
         """Call `name` and return its result; 0x7ffe (not implemented) where it is missing."""
@@ -505,12 +495,7 @@ class SmaractCtlLibrary:
         address = None if function is None else function(*args)
         return ctypes.string_at(address).decode("utf-8", "replace") if address else ""
 
-    def _function(self, name: str) -> Callable[..., Any] | None:
-        # Two threads may bind the same name at once; both make the same binding.
-        if name not in self._bound:
-            self._bound[name] = self._bind(name)
-        return self._bound[name]
-
+    @override
     def _bind(self, name: str) -> Callable[..., Any] | None:
         if isinstance(self._library, ctypes.CDLL):
             try:

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from cosmic.frame.arrays import Floats
 
 CELLS: Final = 48
 INSIDE: Final = 4

@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from cosmic.frame.arrays import ByteMask, Floats
+
 Layer = npt.NDArray[np.uint16]
 Single = npt.NDArray[np.float32]
-Mask = npt.NDArray[np.uint8]
 
 REACH: Final = 3.0
 """Blur is followed so many standard deviations far."""
@@ -42,7 +42,7 @@ class Patch:
         """Return image coordinates as coordinates in the patch."""
         return np.asarray((points_px + 0.5) / self.cell - (self.x + 0.5, self.y + 0.5))
 
-    def fine(self, values: Single | Mask) -> Single | Mask:
+    def fine(self, values: Single | ByteMask) -> Single | ByteMask:
         """Return values of the patch for each pixel of the layer in it."""
         if self.cell == 1:
             return values
@@ -51,7 +51,7 @@ class Patch:
         height = self.rows.stop - self.rows.start
         width = self.columns.stop - self.columns.start
         found = whole[:height, :width]
-        return cast("Single | Mask", found)
+        return cast("Single | ByteMask", found)
 
 
 def patch(layer: Layer, points_px: Floats, reach_px: float, sigma_px: float) -> Patch | None:
@@ -86,7 +86,7 @@ def darken(layer: Layer, where: Patch, passed: Single) -> None:
     layer[where.rows, where.columns] = cv2.multiply(part, fine, dtype=cv2.CV_16U)
 
 
-def cover(layer: Layer, where: Patch, mask: Mask, value: float) -> None:
+def cover(layer: Layer, where: Patch, mask: ByteMask, value: float) -> None:
     """Put one brightness over the layer where the mask, shape of the patch, says 255."""
     above = where.fine(mask).astype(np.uint16)
     part = layer[where.rows, where.columns]

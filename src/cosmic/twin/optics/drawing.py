@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Final, Protocol
 from weakref import WeakValueDictionary, finalize
 
 import numpy as np
-import numpy.typing as npt
 from typing_extensions import override
 
+from cosmic.frame.arrays import Pixels
 from cosmic.frame.helper_process import HelperFaultError, HelperProcess, Reply
 from cosmic.twin.optics.settings import OpticsSettings
 
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
 MODULE: Final = "cosmic.twin.optics.drawing_helper"
 LIMIT_S: Final = 20.0

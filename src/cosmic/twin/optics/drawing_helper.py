@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import cv2
 
+from cosmic.frame.arrays import Pixels
 from cosmic.frame.garbage import freeze_what_is_loaded
 from cosmic.frame.helper_process import READY, End, encode
 from cosmic.frame.platform_services import run_in_background
-from cosmic.twin.optics.drawing import Pixels, make_views
+from cosmic.twin.optics.drawing import make_views
 
 if TYPE_CHECKING:
     from cosmic.twin.optics.subjects import Lying

@@ -7,7 +7,8 @@ from typing import Final
 import cv2
 import numpy as np
 
-from cosmic.twin.optics.canvas import Floats, Layer
+from cosmic.frame.arrays import Floats
+from cosmic.twin.optics.canvas import Layer
 from cosmic.twin.optics.projection import Projection
 from cosmic.twin.optics.settings import ImageSettings, SensorSettings
 from cosmic.twin.optics.strokes import Shade, speck, stroke

@@ -5,11 +5,9 @@ from typing import Final
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Pixels
 from cosmic.twin.optics.canvas import Layer
-
-Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
 MARGIN_PX: Final = 192
 """So many points across and down from which an image's noise may be cut."""

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats, Pixels
 from cosmic.twin.force_side import ForceSide
-from cosmic.twin.kinematics import Floats, Point
+from cosmic.twin.kinematics import Point
 from cosmic.twin.lens import LensAxisName, TwinLens
 from cosmic.twin.light import TwinLight
 from cosmic.twin.optics.drawing import (
     Drawer,
     Drawing,
     LocalDrawer,
-    Pixels,
     RemoteDrawer,
     drawing_process,
 )
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from cosmic.twin.optics.subjects import Subjects
 
 MICROSCOPE: Final = "microscope"
-OVERVIEW: Final = "overview"
 
 
 class RoiLike(Protocol):

@@ -5,11 +5,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.optics.settings import SensorSettings, ViewSettings
-
-Floats = npt.NDArray[np.float64]
 
 DIFFRACTION: Final = 0.21
 """Standard deviation of the image of a point, in wavelengths over the aperture."""

@@ -4,9 +4,8 @@ import math
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from cosmic.frame.arrays import Floats
 
 NODES: Final = 41
 

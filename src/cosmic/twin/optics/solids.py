@@ -7,8 +7,9 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import ConfigError
-from cosmic.twin.kinematics import UM_PER_M, Floats, from_rpy
+from cosmic.twin.kinematics import UM_PER_M, from_rpy
 
 ROUND: Final = 24
 """Corners of what stands for a circle."""

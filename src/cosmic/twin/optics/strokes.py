@@ -8,7 +8,8 @@ from typing import Final
 import cv2
 import numpy as np
 
-from cosmic.twin.optics.canvas import REACH, Floats, Layer, Patch, Single, darken, patch
+from cosmic.frame.arrays import Floats
+from cosmic.twin.optics.canvas import REACH, Layer, Patch, Single, darken, patch
 
 STEPS: Final = 16
 """Steps a pixel in tables over a distance."""

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats
 from cosmic.twin.felt import Moment, Push
 from cosmic.twin.fibre_state import FibreState
 from cosmic.twin.force_side import ForceSide
-from cosmic.twin.kinematics import Floats, Point, Slide
+from cosmic.twin.kinematics import Point, Slide
 from cosmic.twin.optics.bent import Compliance, bent
 from cosmic.twin.optics.ground import on_plate
 from cosmic.twin.optics.shapes import bridge

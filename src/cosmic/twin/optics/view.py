@@ -7,9 +7,9 @@ from typing import Final
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from cosmic.twin.optics.canvas import Floats, Layer, cover, patch
+from cosmic.frame.arrays import Floats, Pixels
+from cosmic.twin.optics.canvas import Layer, cover, patch
 from cosmic.twin.optics.ground import FULL, Dirt, even_light, soil
 from cosmic.twin.optics.noise import Noise
 from cosmic.twin.optics.projection import STEADY, Area, Projection, Wobble, project
@@ -107,8 +107,6 @@ def _area(points: Points) -> float:
     following = [*points[1:], points[0]]
     return sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in zip(points, following, strict=True))
 
-
-Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
 PER_GREY: Final = 64
 """Steps of a layer in one grey level of 255: four times full white fit in."""

@@ -49,7 +49,7 @@ class VicoApplication(TaskApplication):
         Returns where every axis was at a platform time; called in the cameras' threads.
     focus_models : FocusModels
         How fast images blur with the focus, as far as sweeps have taught it.
-    points : Points or None
+    transform : CoordinateTransform or None
         What joins pixels and platform, where micromanipulation is hosted as well.
     """
 

@@ -27,7 +27,6 @@ from cosmic.vico.api.camera_images import (
     RemoteImages,
     always,
 )
-from cosmic.vico.api.camera_shape import CameraShape
 from cosmic.vico.api.camera_shown import (
     FormatShown,
     LinkShown,
@@ -37,6 +36,7 @@ from cosmic.vico.api.camera_shown import (
     utc_of,
 )
 from cosmic.vico.api.coordinate_transform import CoordinateTransform, RotationShown
+from cosmic.vico.api.plan_camera import PlanCamera
 from cosmic.vico.api.sent_image import SentImage, SentSeen
 from cosmic.vico.core.camera_recordings import ImageRecordingState
 from cosmic.vico.core.image import CameraImage
@@ -59,7 +59,7 @@ if TYPE_CHECKING:
 
 
 @checked_class
-class CameraHandle(CameraCoordinates, CameraShape, Declared):
+class CameraHandle(CameraCoordinates, PlanCamera, Declared):
     """One camera: its images, settings, recordings and what machine vision finds; any thread.
 
     It has the shape of a bluesky detector without importing bluesky.

@@ -4,6 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.renamed import Renamed
 from cosmic.vico.api.coordinate_transform import CoordinateTransform
@@ -11,7 +12,6 @@ from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.vision.algorithms import grey
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.finding import find_fibres
-from cosmic.vico.core.vision.grey import Floats
 from cosmic.vico.core.vision.tool_bodies import without_tools
 
 

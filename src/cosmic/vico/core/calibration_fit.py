@@ -9,15 +9,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import CosmicError
-from cosmic.vico.core.pixel_map import (
-    Floats,
-    Pair,
-    PixelMap,
-    as_matrix,
-    as_pair,
-    straightened,
-)
+from cosmic.vico.core.pixel_map import Pair, PixelMap, as_matrix, as_pair, straightened
 
 FEWEST_POINTS: Final = 4
 LARGEST_RMS_PX: Final = 0.5

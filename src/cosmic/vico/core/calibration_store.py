@@ -56,7 +56,7 @@ class _Plane(StrictModel):
             raise ValueError("matrix_px_um maps no platform to an image; measure again")
         leverage = np.array(self.leverage_um2)
         if not (np.allclose(leverage, leverage.T) and np.linalg.eigvalsh(leverage).min() > 0.0):
-            raise ValueError("leverage_um2 is no inverse of a sum of squares; measure again")
+            raise ValueError("leverage_um2 is not the inverse of a sum of squares; measure again")
         return self
 
     def plane(self) -> Plane:

@@ -7,7 +7,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from cosmic.frame.arrays import Floats
+
 Pair = tuple[float, float]
 Matrix = tuple[Pair, Pair]
 

@@ -9,11 +9,11 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from cosmic.frame.errors import QuantityError
 from cosmic.frame.gui.build import retip
+from cosmic.frame.gui.key_focus import ENTER_KEYS
 from cosmic.frame.gui.number_edit import NumberEdit, read_number
 from cosmic.frame.overrides import override
 from cosmic.vico.gui.texts import number_text, plain_steps
 
-_ENTER: Final = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 _STEPS: Final = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1}
 
 
@@ -172,7 +172,7 @@ class AmountField(NumberEdit):
             event.accept()
         else:
             super().keyPressEvent(event)
-            if event.key() in _ENTER and self.commit():
+            if event.key() in ENTER_KEYS and self.commit():
                 self.selectAll()
 
     @override

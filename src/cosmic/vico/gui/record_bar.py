@@ -25,6 +25,7 @@ from cosmic.frame.gui.amounts import duration_text, size_text
 from cosmic.frame.gui.beside import open_beside
 from cosmic.frame.gui.build import named, push_button, styled, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.key_focus import ENTER_KEYS
 from cosmic.frame.gui.overwrite_question import overwrite_question
 from cosmic.frame.gui.task_bar import TaskBar
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
@@ -86,7 +87,7 @@ class TimeLapseDialog(QDialog):
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+        if event.key() in ENTER_KEYS:
             event.accept()  # Enter judges a field here; a dialog would begin at once
             return
         super().keyPressEvent(event)

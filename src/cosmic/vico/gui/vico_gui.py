@@ -2,8 +2,7 @@
 
 from collections import Counter
 
-from PySide6.QtCore import QObject, Qt
-from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
+from PySide6.QtCore import QObject
 
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.vico.api.vico import Vico, vico_of
@@ -39,21 +38,3 @@ def make_vico_gui(application: CosmicApplicationBase) -> VicoGui:
         title = titles[name]
         view.setWindowTitle(title if alike[title] == 1 else f"{title} ({name})")
     return gui
-
-
-class VicoWidget(QWidget):
-    """All of it in one widget, for a window without docks."""
-
-    def __init__(self, vico: Vico, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("ViCo")
-        self.gui = VicoGui(vico)
-        side = QSplitter(Qt.Orientation.Horizontal)
-        for view in self.gui.cameras.values():
-            side.addWidget(view)
-        side.addWidget(self.gui.lens)
-        for index in range(len(self.gui.cameras)):
-            side.setStretchFactor(index, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(side)

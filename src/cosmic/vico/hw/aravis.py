@@ -15,7 +15,7 @@ from cosmic.frame.plugins import NoOptions
 from cosmic.vico.hw import aravis_ctypes as arv
 from cosmic.vico.hw.aravis_ctypes import AravisBuffer, AravisCalls, AravisStream
 from cosmic.vico.hw.base_camera import BaseCamera, BaseCameraLibrary, Sensor
-from cosmic.vico.hw.camera_frames import (
+from cosmic.vico.hw.bus_frames import (
     BAYER,
     FrameNumbers,
     FrameTimes,

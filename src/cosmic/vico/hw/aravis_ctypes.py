@@ -24,7 +24,7 @@ from ctypes import (
 from typing import Any, Final
 
 from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout
-from cosmic.vico.hw.camera_frames import buffers_for, copy_rows, empty_pixels
+from cosmic.vico.hw.bus_frames import buffers_for, copy_rows, empty_pixels
 from cosmic.vico.hw.camera_library import bind_functions, load_camera_library
 from cosmic.vico.hw.interface import CameraSettings, Pixels
 

@@ -23,7 +23,7 @@ from cosmic.frame.errors import (
 )
 from cosmic.frame.plugins import NoOptions
 from cosmic.vico.hw.base_camera import BaseCamera, BaseCameraLibrary, Sensor
-from cosmic.vico.hw.camera_frames import BAYER, FrameNumbers, empty_pixels, from_bayer
+from cosmic.vico.hw.bus_frames import BAYER, FrameNumbers, empty_pixels, from_bayer
 from cosmic.vico.hw.interface import (
     CameraBackend,
     CameraContext,

@@ -9,16 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
-import numpy.typing as npt
 from typing_extensions import override
 
+from cosmic.frame.arrays import Pixels as Pixels
 from cosmic.frame.clock import Clock
 from cosmic.frame.plugins import Backend
 
 if TYPE_CHECKING:
     from cosmic.twin.scene import Scene
-
-Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
 
 class PixelFormat(StrEnum):

@@ -189,7 +189,7 @@ class _SerialRegisters(Registers):
                 fault=DeviceFault.TIMEOUT,
             )
         shown = received[-SHOWN_BYTES:].hex(" ")
-        return ProtocolError(f"{asked}, received {shown}, which is no answer")
+        return ProtocolError(f"{asked}, received {shown}, which is not an answer")
 
 
 class FrameRegisters(_SerialRegisters):

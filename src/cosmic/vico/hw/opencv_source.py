@@ -129,7 +129,7 @@ class ImageFilm(Film):
         self._next = 0
         first = _decoded(self._paths[0])
         if first is None:
-            raise _unreadable(self._paths[0], "it is no image of 8 or 16 bits")
+            raise _unreadable(self._paths[0], "it is not an image of 8 or 16 bits")
         self.first = first
 
     @override

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from threading import Condition
 from typing import Final
 
+from cosmic.frame.arguments import check_fault
 from cosmic.frame.errors import ArgumentError
 
 NAMES: Final = ("unplugged", "taken", "incomplete", "lost", "frozen", "slow")
@@ -61,7 +62,7 @@ class CameraFaults:
         share : float
             The part of the frames that it strikes, 0 to 1; which ones, the seed decides.
         """
-        _check_name(name)
+        check_fault(name, NAMES)
         if not 0.0 <= share <= 1.0:
             raise ArgumentError(f"a part of the frames lies between 0 and 1, got {share!r}")
         with self.changed:
@@ -73,7 +74,7 @@ class CameraFaults:
     def clear(self, name: str | None = None, *, camera: str | None = None) -> None:
         """End the fault `name`, or all; with a camera only what was injected there."""
         if name is not None:
-            _check_name(name)
+            check_fault(name, NAMES)
         with self.changed:
             self._active = tuple(
                 each
@@ -97,8 +98,3 @@ class CameraFaults:
     def times_pulled(self, camera: str) -> int:
         """Return how often a camera was unplugged."""
         return self._pulled.get(camera, 0) + self._pulled.get(None, 0)
-
-
-def _check_name(name: str) -> None:
-    if name not in NAMES:
-        raise ArgumentError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")

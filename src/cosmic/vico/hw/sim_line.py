@@ -7,7 +7,7 @@ from typing import Final, Protocol
 
 from typing_extensions import override
 
-from cosmic.frame.errors import ArgumentError
+from cosmic.frame.arguments import check_fault
 from cosmic.vico.hw.serial_port import SerialLike
 
 NAMES: Final = ("garbage", "lost_bytes", "silent", "unplugged")
@@ -47,21 +47,16 @@ class LineFaults:
 
     def inject(self, name: str) -> None:
         """Put the fault `name` in force; raises `ArgumentError`."""
-        _check_name(name)
+        check_fault(name, NAMES)
         with self._lock:
             self._active |= {name}
 
     def clear(self, name: str | None = None) -> None:
         """End the fault `name`, or all; raises `ArgumentError`."""
         if name is not None:
-            _check_name(name)
+            check_fault(name, NAMES)
         with self._lock:
             self._active = self._active - {name} if name else frozenset()
-
-
-def _check_name(name: str) -> None:
-    if name not in NAMES:
-        raise ArgumentError(f"there is no fault {name!r}; known: {', '.join(NAMES)}")
 
 
 class SimLine:

@@ -184,7 +184,7 @@ def test_a_fibre_that_slopes_too_much_is_refused_with_its_slope() -> None:
         ([0.0, 100.0, 50.0], [0.0, 0.0, 0.0], 90.0, "must rise"),
         ([0.0, 100.0], [0.0, 0.0], 300.0, "must rise .* at 300 um"),
         ([0.0, 100.0], [0.0], 50.0, "one list"),
-        ([0.0, math.nan], [0.0, 0.0], 50.0, "no numbers"),
+        ([0.0, math.nan], [0.0, 0.0], 50.0, "not numbers"),
     ],
 )
 def test_a_shape_that_is_none_is_refused(ahead, aside, at_um: float, says: str) -> None:

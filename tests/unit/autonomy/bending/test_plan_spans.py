@@ -87,7 +87,7 @@ def test_a_fibre_too_short_is_refused_with_what_is_needed() -> None:
 
 @pytest.mark.parametrize("guess", [0.0, -1e-11, float("nan"), float("inf")])
 def test_a_guess_that_is_no_stiffness_is_refused(guess: float) -> None:
-    with pytest.raises(BendingError, match="no bending stiffness to plan with"):
+    with pytest.raises(BendingError, match="not a bending stiffness to plan with"):
         plan_spans(1000.0, guess)
 
 

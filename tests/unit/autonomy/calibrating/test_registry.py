@@ -118,7 +118,7 @@ def test_what_is_no_number_is_never_in_force_and_keeps_nothing_else_from_being_k
     good = entry(registry)
     registry.put(good)
     for other in (replace(good, values={"up_um": wrong}), replace(good, residual=wrong)):
-        with pytest.raises(ConfigError, match="no number; measure it again"):
+        with pytest.raises(ConfigError, match="not a number; measure it again"):
             registry.put(other)
     found = registry.get("height", "left")
     assert found is not None

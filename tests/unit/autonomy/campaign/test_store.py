@@ -181,7 +181,7 @@ def test_no_campaign_is_begun_over_another(store: CampaignStore) -> None:
 def test_a_folder_without_a_campaign_is_reported(tmp_path: Path) -> None:
     with pytest.raises(CampaignError, match=r"holds no campaign: there is no campaign\.sqlite"):
         CampaignStore.open(tmp_path)
-    with pytest.raises(CampaignError, match="holds no campaign: it is no folder"):
+    with pytest.raises(CampaignError, match="holds no campaign: it is not a folder"):
         CampaignReader(tmp_path / "mistyped").check()
     (tmp_path / "campaign.sqlite").write_bytes(b"this is no database, but long enough" * 10)
     with pytest.raises(CampaignError, match=r"campaign\.sqlite"):

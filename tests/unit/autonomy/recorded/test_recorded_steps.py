@@ -152,7 +152,7 @@ def test_a_replay_asks_for_what_is_marked_and_takes_other_values() -> None:
         (f"{'.'.join('a' * 3000)} = 1", "too deep"),
         (
             'name = "a"\n[[step]]\nkind = "record"\nname = "r"\nask = {name = "x"}\n',
-            "'name' is no num",
+            "'name' is not a num",
         ),
         (
             'name = "a"\n[[step]]\nkind = "pause"\nseconds = 1.0\nask = {hops = "x"}\n',

@@ -69,10 +69,10 @@ FILES = Certificates(Path("authority.pem"), Path("certificate.pem"), Path("key.p
         ("tcp/192.168.1.5:7450", FILES, ("vision",), "only tls with certificates"),
         ("tls/192.168.1.5:7450", None, ("vision",), "needs certificates"),
         ("tls/192.168.1.5:7450", FILES, (), "list the clients"),
-        ("udp/127.0.0.1:7450", None, (), "is no endpoint"),
-        ("tcp/127.0.0.1", None, (), "is no endpoint"),
-        ("127.0.0.1:7450", None, (), "is no endpoint"),
-        ("tcp/127.0.0.1:http", None, (), "is no endpoint"),
+        ("udp/127.0.0.1:7450", None, (), "is not an endpoint"),
+        ("tcp/127.0.0.1", None, (), "is not an endpoint"),
+        ("127.0.0.1:7450", None, (), "is not an endpoint"),
+        ("tcp/127.0.0.1:http", None, (), "is not an endpoint"),
     ],
 )
 def test_nothing_listens_beyond_this_computer_without_certificates(

@@ -17,7 +17,7 @@ from cosmic.frame.errors import (
 from cosmic.vico.hw import aravis_ctypes as arv
 from cosmic.vico.hw.aravis import AravisLibrary
 from cosmic.vico.hw.base_camera import as_refusal
-from cosmic.vico.hw.camera_frames import buffers_for
+from cosmic.vico.hw.bus_frames import buffers_for
 from cosmic.vico.hw.interface import PixelFormat
 
 

@@ -136,7 +136,7 @@ def test_what_is_no_film_is_named_with_the_reason(tmp_path: Path) -> None:
     for name, reason in (
         ("film.mkv", "no images"),
         ("empty", "holds no images"),
-        ("broken", "no image of 8 or 16 bits"),
+        ("broken", "not an image of 8 or 16 bits"),
         ("gone.mkv", "cannot open a camera"),
     ):
         with pytest.raises(NotConnectedError, match=reason):
@@ -157,7 +157,7 @@ def boundless_png() -> bytes:
 
 def test_an_image_that_opencv_fails_at_is_named_at_the_beginning_and_later(tmp_path: Path) -> None:
     (tmp_path / "b.png").write_bytes(boundless_png())
-    with pytest.raises(NotConnectedError, match=r"b\.png: it is no image"):
+    with pytest.raises(NotConnectedError, match=r"b\.png: it is not an image"):
         opened(VideoSource(str(tmp_path)))
     cv2.imwrite(str(tmp_path / "a.png"), pattern(0))
     camera = opened(VideoSource(str(tmp_path), paced=False))

@@ -181,7 +181,7 @@ def test_files_that_are_something_else_are_reported(tmp_path):
         open_image_recording(tmp_path / "a.mkv")
     (tmp_path / "b.mkv").touch()
     (tmp_path / "b.csv").write_text("x,y\n1,2\n")
-    with pytest.raises(RecordingError, match="no side file"):
+    with pytest.raises(RecordingError, match="not a side file"):
         open_image_recording(tmp_path / "b.mkv")
     recorded(tmp_path / "c", ImageFormat.FFV1, 2)
     text = (tmp_path / "c.csv").read_text().replace("100.05,", "soon,")

@@ -2,33 +2,18 @@
 
 import os
 import sys
-from datetime import datetime
 
 import pytest
 
 from cosmic.frame.errors import RecordingError, RecordingExistsError
-from cosmic.frame.file_names import NameOption
 from cosmic.vico.core.recording.formats import (
     ImageFormat,
-    image_file_name,
     recording_suffix,
     traits,
 )
 from cosmic.vico.core.recording.image_file import ImageFile
 from cosmic.vico.core.recording.side_row import row_of
 from unit.vico.recording.image_helpers import image, noise
-
-
-def test_a_name_takes_the_ending_of_its_format_a_time_or_a_number(tmp_path):
-    when = datetime(2026, 5, 4, 9, 8, 7)
-    assert image_file_name("fibre", ImageFormat.FFV1) == "fibre.mkv"
-    assert image_file_name("fibre 1.5", ImageFormat.TIFF) == "fibre 1.5"
-    stamped = image_file_name("fibre", ImageFormat.FAST, NameOption.TIME, when=when)
-    assert stamped == "fibre_2026-05-04_09-08-07.nut"
-    (tmp_path / "fibre_004").mkdir()
-    (tmp_path / "fibre_002.csv").touch()
-    for wanted, name in ((ImageFormat.FFV1, "fibre_005.mkv"), (ImageFormat.PNG, "fibre_005")):
-        assert image_file_name("fibre", wanted, NameOption.NUMBER, directory=tmp_path) == name
 
 
 @pytest.mark.parametrize(

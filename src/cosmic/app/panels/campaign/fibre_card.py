@@ -25,7 +25,6 @@ from cosmic.app.panels.state_indicator import StateIndicator
 from cosmic.autonomy.campaign.formatting import (
     EI_LABEL,
     NONE,
-    TWO_SIDED,
     interval,
     length_words,
     number,
@@ -33,8 +32,9 @@ from cosmic.autonomy.campaign.formatting import (
     width_words,
     with_interval,
 )
-from cosmic.autonomy.campaign.records import FibreImage, Floats
-from cosmic.autonomy.campaign.snapshot import FibreCardData, Mask, SpanCurve
+from cosmic.autonomy.campaign.records import FibreImage
+from cosmic.autonomy.campaign.snapshot import FibreCardData, SpanCurve
+from cosmic.frame.arrays import Floats, Mask
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.chip import Chip
@@ -43,6 +43,7 @@ from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.palette import OKABE_ITO, ON_IMAGE, Palette
 from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
 from cosmic.frame.overrides import override
+from cosmic.frame.units import TWO_SIDED
 
 
 class FibreImageView(QWidget):

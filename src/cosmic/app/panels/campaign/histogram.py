@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QWidget
 
 from cosmic.app.panels.curve_frame import CurveFrame
 from cosmic.autonomy.campaign.formatting import EI_LABEL, EI_UNIT
-from cosmic.autonomy.campaign.records import Floats
 from cosmic.autonomy.campaign.snapshot import MeasuredEi
 from cosmic.autonomy.campaign.statistics import MeanEi
+from cosmic.frame.arrays import Floats
 from cosmic.frame.gui.palette import OKABE_ITO, Palette
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override

@@ -28,6 +28,7 @@ from cosmic.autonomy.campaign.formatting import (
 from cosmic.autonomy.campaign.records import Outcome
 from cosmic.autonomy.campaign.snapshot import FibreRow
 from cosmic.frame.gui.amounts import duration_text
+from cosmic.frame.gui.key_focus import ENTER_KEYS
 from cosmic.frame.gui.theme import STEP_PX, State, number_font
 from cosmic.frame.overrides import override
 
@@ -207,7 +208,7 @@ class FibreTable(QTableView):
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
         index = self.currentIndex()
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and index.isValid():
+        if event.key() in ENTER_KEYS and index.isValid():
             self.fibre_chosen.emit(self.rows.number(index.row()))
             event.accept()
             return

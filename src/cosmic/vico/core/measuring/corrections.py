@@ -20,10 +20,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import ConfigError, RecordingError, RecordingExistsError
 from cosmic.frame.kept_file import write_whole
 from cosmic.vico.core.vision.fibre import Fibre, paint
-from cosmic.vico.core.vision.grey import MOST_SIDE_PX, Floats, grey_image
+from cosmic.vico.core.vision.grey import MOST_SIDE_PX, grey_image
 from cosmic.vico.core.vision.smoothing import arc_lengths, resampled
 
 if TYPE_CHECKING:

@@ -95,7 +95,7 @@ def unreadable(path: Path, why: str) -> RecordingError:
 
 
 def _refused(constant: str) -> object:
-    raise ValueError(f"it has {constant}, which is no number")
+    raise ValueError(f"it has {constant}, which is not a number")
 
 
 def _shortened(problems: str) -> str:

@@ -70,7 +70,7 @@ def _still(path: Path) -> FileImage:
         coded = path.read_bytes()
         pixels = cv2.imdecode(np.frombuffer(coded, np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None:
-        raise RecordingError(f"{path}: is no image, or damaged")
+        raise RecordingError(f"{path}: is not an image, or damaged")
     # OpenCV makes grey of what is missing at the end of a JPEG.
     if coded.startswith(JPEG_HEAD) and JPEG_END not in coded[coded.rfind(JPEG_SCAN) :]:
         raise RecordingError(f"{path}: is cut off; copy it again from where it was made")
@@ -99,7 +99,7 @@ def _video_images(path: Path, every: int, refused: Refused | None) -> Iterator[F
     finally:
         video.release()
     if not number:
-        raise RecordingError(f"{path}: is no video that can be read, or damaged")
+        raise RecordingError(f"{path}: is not a video that can be read, or damaged")
     # Matroska has no number of images: OpenCV rounds one from the duration.
     rounded = 1 if path.suffix.lower() == ".mkv" else 0
     if lost or number < declared - rounded:

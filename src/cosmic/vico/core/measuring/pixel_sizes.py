@@ -262,4 +262,4 @@ def _physical_um(pixels: ElementTree.Element, axis: str) -> float | None:
     try:
         return float(pixels.attrib[name]) * um
     except ValueError:
-        raise ValueError(f"{pixels.attrib[name]!r} (OME) is no size") from None
+        raise ValueError(f"{pixels.attrib[name]!r} (OME) is not a size") from None

@@ -53,7 +53,7 @@ def tiff_pages(path: Path, refused: Refused | None = None) -> Iterator[FileImage
 
     with reading(str(path)), tifffile.TiffFile(path) as file:
         if not len(file.pages):
-            raise RecordingError(f"{path}: is no TIFF, or damaged: it has no page")
+            raise RecordingError(f"{path}: is not a TIFF, or damaged: it has no page")
         metadata = _Metadata(file)
         if metadata.declared > 1 and len(file.pages) == 1:
             yield from _stack_of_one_page(path, file, metadata, refused)

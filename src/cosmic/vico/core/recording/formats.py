@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import Final
@@ -10,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from cosmic.frame.errors import RecordingError
-from cosmic.frame.file_names import NameOption, check_base_name, check_directory, file_name
+from cosmic.frame.file_names import check_base_name, check_directory
 from cosmic.vico.hw.interface import CameraSettings, PixelFormat, Pixels
 
 SIDE_SUFFIX: Final = ".csv"
@@ -181,28 +180,6 @@ def image_bytes_per_s(image_format: ImageFormat, settings: CameraSettings) -> fl
     sample_bytes = {PixelFormat.MONO8: 1, PixelFormat.RGB8: 3}.get(settings.pixel_format, 2)
     raw = settings.roi.width_px * settings.roi.height_px * sample_bytes * settings.rate_hz
     return raw * traits(image_format).ratio
-
-
-def image_file_name(
-    base: str,
-    image_format: ImageFormat,
-    option: NameOption = NameOption.NONE,
-    *,
-    when: datetime | None = None,
-    directory: Path | None = None,
-) -> str:
-    """Return the whole name of a recording, or of the directory of a sequence.
-
-    Parameters, Raises
-    ------------------
-    As `cosmic.frame.file_names.file_name`. A number is in use when a recording of any format
-    has it, since they share the name of the side file.
-    """
-    endings = {"", SIDE_SUFFIX, *(each.suffix for each in FORMATS.values())}
-    suffix = recording_suffix(image_format)
-    return file_name(
-        base, option, suffix=suffix, when=when, directory=directory, taken_by=sorted(endings)
-    )
 
 
 def recording_suffix(image_format: ImageFormat) -> str:

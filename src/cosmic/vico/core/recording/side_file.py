@@ -131,7 +131,7 @@ def read_side_file(path: Path) -> SideTable:
     lines = csv.DictReader(io.StringIO(whole, newline=""))
     header = lines.fieldnames or ()
     if header and not set(COLUMNS) <= set(header):
-        raise RecordingError(f"{path}: is no side file of a recording of images")
+        raise RecordingError(f"{path}: is not a side file of a recording of images")
     units = _axes(header)
     columns = {position_column(axis, unit): axis for axis, unit in units.items()}
     try:

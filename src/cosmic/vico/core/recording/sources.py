@@ -152,7 +152,7 @@ def read_image(path: Path) -> Pixels:
     except (OSError, ValueError, cv2.error, tifffile.TiffFileError) as exc:
         raise RecordingError(f"{path}: cannot be read ({exc})") from exc
     if data is None:
-        raise RecordingError(f"{path}: is no image, or damaged")
+        raise RecordingError(f"{path}: is not an image, or damaged")
     found: Pixels = data
     return found
 

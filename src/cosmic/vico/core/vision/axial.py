@@ -22,7 +22,8 @@ from scipy.ndimage import (
     uniform_filter1d,
 )
 
-from cosmic.vico.core.vision.grey import Floats, Floats32, middle, middles
+from cosmic.frame.arrays import Floats, Floats32
+from cosmic.vico.core.vision.grey import middle, middles
 from cosmic.vico.core.vision.profiles import Flags, Scene, sample
 from cosmic.vico.core.vision.refine import STEP_PX, Course
 from cosmic.vico.core.vision.smoothing import (

@@ -10,8 +10,9 @@ from typing import Final
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
+from cosmic.frame.arrays import ByteMask, Floats
 from cosmic.vico.core.vision.ends import EndKind, bent, leaving
-from cosmic.vico.core.vision.grey import Floats, Mask, middle
+from cosmic.vico.core.vision.grey import middle
 from cosmic.vico.core.vision.profiles import Flags, Scene, sample, within
 from cosmic.vico.core.vision.refine import STEP_PX, Course
 from cosmic.vico.core.vision.smoothing import directions
@@ -41,7 +42,7 @@ BESIDE: Final = (1.0, 4.0)
 DEEP_WIDTHS: Final = 12.0
 
 
-def goes_on(scene: Scene, course: Course, explained: Mask) -> float:
+def goes_on(scene: Scene, course: Course, explained: ByteMask) -> float:
     """Return how clearly something goes on beyond an end; from 1 on it counts.
 
     Parameters
@@ -121,7 +122,7 @@ def _level(scene: Scene, line: Floats, along: Floats, across: Floats) -> float:
     return scene.sign * middle(sample(scene.image, x, y)[inside].astype(np.float64))
 
 
-def _rays(scene: Scene, course: Course, at: int, explained: Mask) -> float:
+def _rays(scene: Scene, course: Course, at: int, explained: ByteMask) -> float:
     line = course.line if at else course.line[::-1]
     count = min(max(round(0.6 * course.width), 3), max(3, len(line) // 3))
     out = line[-1] - line[-1 - min(count, len(line) - 1)]

@@ -14,10 +14,10 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.frame.arrays import ByteMask, Floats
 from cosmic.vico.core.vision import axial, beyond, learned_joint
 from cosmic.vico.core.vision.axial import Joints
 from cosmic.vico.core.vision.ends import EndKind
-from cosmic.vico.core.vision.grey import Floats, Mask
 from cosmic.vico.core.vision.joining import ON_ANOTHER
 from cosmic.vico.core.vision.profiles import Scene
 from cosmic.vico.core.vision.refine import Course
@@ -126,7 +126,7 @@ class Signs:
         return np.concatenate([along[:, place], whole, learned])[: len(weights)]
 
 
-def signs_of(scene: Scene, course: Course, explained: Mask) -> Signs:
+def signs_of(scene: Scene, course: Course, explained: ByteMask) -> Signs:
     """Return the signs of a course; `explained` says where fibres lie on the reduced image."""
     compressed = scene.blockiness / BLOCKY
     # What more compression takes away a network cannot see.

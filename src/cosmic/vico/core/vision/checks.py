@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from cosmic.frame.arrays import Floats
 from cosmic.vico.core.vision.ends import EndKind
-from cosmic.vico.core.vision.grey import Floats, middle, middles, quantile
+from cosmic.vico.core.vision.grey import middle, middles, quantile
 from cosmic.vico.core.vision.profiles import Scene, sample
 from cosmic.vico.core.vision.refine import STEP_PX, Course
 from cosmic.vico.core.vision.smoothing import levelled

@@ -7,7 +7,8 @@ from typing import Final, NamedTuple
 import cv2
 import numpy as np
 
-from cosmic.vico.core.vision.grey import Floats, Floats32, middle, middles, quantile
+from cosmic.frame.arrays import Floats, Floats32
+from cosmic.vico.core.vision.grey import middle, middles, quantile
 from cosmic.vico.hw.interface import Pixels
 
 Pair = tuple[float, float]

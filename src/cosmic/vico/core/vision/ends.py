@@ -5,7 +5,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from cosmic.vico.core.vision.grey import Floats, middle
+from cosmic.frame.arrays import Floats
+from cosmic.vico.core.vision.grey import middle
 from cosmic.vico.core.vision.profiles import Flags, Scene, sample, within
 from cosmic.vico.core.vision.smoothing import directions, softened
 

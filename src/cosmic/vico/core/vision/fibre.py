@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from cosmic.vico.core.vision.grey import Floats, Mask
+from cosmic.frame.arrays import ByteMask, Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,14 +87,14 @@ class Fibre:
 SHIFT_BITS = 4
 
 
-def fibre_mask(fibre: Fibre, shape: tuple[int, ...]) -> Mask:
+def fibre_mask(fibre: Fibre, shape: tuple[int, ...]) -> ByteMask:
     """Return ndarray of `shape` (rows, columns), uint8: 1 where the fibre lies, 0 elsewhere."""
     mask = np.zeros(shape[:2], np.uint8)
     paint(mask, fibre.centre_line_px, fibre.widths_px)
     return mask
 
 
-def paint(mask: Mask, line: Floats, widths: Floats, value: int = 1) -> None:
+def paint(mask: ByteMask, line: Floats, widths: Floats, value: int = 1) -> None:
     """Paint a strip of given widths along a line into a mask."""
     tangent = np.gradient(line, axis=0)
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)

@@ -7,11 +7,11 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.tracking import TrackState
 
-Floats = npt.NDArray[np.float64]
 Pair = tuple[float, float]
 
 LARGEST_LENGTH_CHANGE: Final = 0.15

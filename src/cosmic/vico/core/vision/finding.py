@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.frame.arrays import ByteMask, Floats
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.vision import (
     axial,
@@ -20,7 +21,7 @@ from cosmic.vico.core.vision import (
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
-from cosmic.vico.core.vision.grey import Floats, Mask, grey_image, middle
+from cosmic.vico.core.vision.grey import grey_image, middle
 from cosmic.vico.core.vision.joining import Strand, strands
 from cosmic.vico.core.vision.measures import (
     grasp_points,
@@ -311,7 +312,7 @@ def checked_fibres(
 
 
 def doubts_by_itself(
-    scene: Scene, course: Course, section: Section, signs: certainty.Signs, explained: Mask
+    scene: Scene, course: Course, section: Section, signs: certainty.Signs, explained: ByteMask
 ) -> list[str]:
     """Return what is doubtful about a fibre where it lies on the image."""
     compressed = signs.compressed > certainty.NOISE
@@ -331,14 +332,14 @@ def touches_border(scene: Scene, course: Course) -> bool:
     return bool((course.line < room).any() or (course.line > scene.corner - room).any())
 
 
-def strip(mask: Mask, line: Floats, width: float) -> None:
+def strip(mask: ByteMask, line: Floats, width: float) -> None:
     """Paint a strip of one width, in as few pieces as its purpose allows."""
     thin = line[:: max(1, len(line) // 120)]
     part = thin if len(thin) > 1 else line
     paint(mask, np.concatenate([part, line[-1:]]), np.full(len(part) + 1, width))
 
 
-def explained_by(scene: Scene, lines: list[Floats], widths: list[float]) -> Mask:
+def explained_by(scene: Scene, lines: list[Floats], widths: list[float]) -> ByteMask:
     """Return where fibres lie on the reduced image, with some room."""
     explained = np.zeros(scene.taken.shape, np.uint8)
     for line, width in zip(lines, widths, strict=True):
@@ -346,7 +347,9 @@ def explained_by(scene: Scene, lines: list[Floats], widths: list[float]) -> Mask
     return explained
 
 
-def left_over(scene: Scene, lines: list[Floats], widths: list[float], explained: Mask) -> set[int]:
+def left_over(
+    scene: Scene, lines: list[Floats], widths: list[float], explained: ByteMask
+) -> set[int]:
     """Return the fibres to which something large clings that no fibre explains."""
     rest = (scene.taken > 0) & (explained == 0)
     _, labels = cv2.connectedComponents(rest.view(np.uint8), connectivity=8)

@@ -13,8 +13,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats, Floats32
 from cosmic.frame.errors import ConfigError
-from cosmic.vico.core.vision.grey import Floats, Floats32, grey_image
+from cosmic.vico.core.vision.grey import grey_image
 from cosmic.vico.hw.interface import Pixels
 
 FEWEST_IMAGES: Final = 4

@@ -7,7 +7,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.vico.core.vision.grey import Floats, Floats32, Mask, middle
+from cosmic.frame.arrays import ByteMask, Floats, Floats32
+from cosmic.vico.core.vision.grey import middle
 from cosmic.vico.core.vision.smoothing import arc_lengths
 
 Flags = npt.NDArray[np.bool_]
@@ -50,7 +51,7 @@ _STEPS: Final[npt.NDArray[np.uint8]] = np.array(
 )
 
 
-def skeletonize(mask: Mask) -> Mask:
+def skeletonize(mask: ByteMask) -> ByteMask:
     """Return the skeleton of what is not zero in `mask`, shape (height, width), uint8, 0 and 1.
 
     Lines stay connected where the mask is; ends stay where they are, up to half a width.
@@ -150,7 +151,7 @@ class Graph:
         return middle(self.half_widths[rows, columns])
 
 
-def build_graph(mask: Mask, most: int) -> Graph | None:
+def build_graph(mask: ByteMask, most: int) -> Graph | None:
     """Return the graph of a mask, or None where it has more than `most` forks."""
     framed = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
     half_widths = cv2.distanceTransform(framed, cv2.DIST_L2, 5)[1:-1, 1:-1]

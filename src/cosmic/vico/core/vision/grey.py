@@ -6,13 +6,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats, Floats32
 from cosmic.frame.errors import ConfigError
 from cosmic.vico.hw.interface import Pixels
 
-Floats = npt.NDArray[np.float64]
-Floats32 = npt.NDArray[np.float32]
 FloatsOrFloats32 = TypeVar("FloatsOrFloats32", Floats, Floats32)
-Mask = npt.NDArray[np.uint8]
 
 LEAST_SIDE_PX = 16
 # What OpenCV's remap takes.

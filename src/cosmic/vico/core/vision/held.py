@@ -10,10 +10,10 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.vico.core.vision import axial, beyond, certainty, checks
 from cosmic.vico.core.vision.ends import EndKind
-from cosmic.vico.core.vision.grey import Floats
 from cosmic.vico.core.vision.profiles import Flags
 from cosmic.vico.core.vision.smoothing import arc_lengths, resampled
 from cosmic.vico.core.vision.tool_types import GripperTips

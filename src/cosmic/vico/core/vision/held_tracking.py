@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.finding import find_fibres
-from cosmic.vico.core.vision.grey import Floats
 from cosmic.vico.core.vision.held import HeldShape, held_shape
 from cosmic.vico.core.vision.joining import Strand
 from cosmic.vico.core.vision.profiles import Scene

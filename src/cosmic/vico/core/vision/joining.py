@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats
 from cosmic.vico.core.vision.graph import FREE, Branch, Graph
-from cosmic.vico.core.vision.grey import Floats
 from cosmic.vico.core.vision.smoothing import arc_lengths
 
 

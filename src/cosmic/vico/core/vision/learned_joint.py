@@ -17,8 +17,9 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats, Floats32
 from cosmic.vico.core.vision.axial import LEAST_WIDTH_PX, unshaded
-from cosmic.vico.core.vision.grey import Floats, Floats32, middle
+from cosmic.vico.core.vision.grey import middle
 from cosmic.vico.core.vision.profiles import Flags, Scene, sample
 from cosmic.vico.core.vision.refine import Course
 from cosmic.vico.core.vision.smoothing import arc_lengths, directions

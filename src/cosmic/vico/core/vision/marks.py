@@ -6,8 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.frame.arrays import Floats
 from cosmic.vico.core.vision.ends import EndKind
-from cosmic.vico.core.vision.grey import Floats, middle
+from cosmic.vico.core.vision.grey import middle
 from cosmic.vico.core.vision.profiles import Scene, sample
 from cosmic.vico.core.vision.refine import Course
 from cosmic.vico.core.vision.smoothing import arc_lengths, directions

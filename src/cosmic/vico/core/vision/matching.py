@@ -6,13 +6,11 @@ from typing import Final
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats, Floats32
 from cosmic.frame.errors import ConfigError
 from cosmic.vico.hw.interface import Pixels, Roi
 
-Floats = npt.NDArray[np.float64]
-Floats32 = npt.NDArray[np.float32]
 Pair = tuple[float, float]
 
 SMALLEST_TEMPLATE_PX: Final = 12
@@ -159,27 +157,6 @@ def displacement(before: Pixels, after: Pixels, region: Roi, reach_px: float) ->
     """
     template = Template(before, region)
     return template.find(after, template.centre_px, reach_px)
-
-
-def drift_px(before: Pixels, after: Pixels) -> tuple[Pair, float]:
-    """Return how far a whole image went, by phase correlation, and how clearly, 0 to 1.
-
-    Raises
-    ------
-    ConfigError
-        The images are of different sizes.
-    """
-    if before.shape != after.shape or before.ndim != 2:
-        raise ConfigError(
-            f"tracking: images of {before.shape} and {after.shape} cannot be compared; "
-            "take both with the same ROI and binning, in grey"
-        )
-    rows, columns = before.shape
-    window = cv2.createHanningWindow((columns, rows), cv2.CV_32F)
-    (x, y), response = cv2.phaseCorrelate(
-        before.astype(np.float32), after.astype(np.float32), window
-    )
-    return (float(x), float(y)), float(response)
 
 
 def _gradient(pixels: Floats32, x: int, y: int) -> Floats:

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from cosmic.vico.core.vision.grey import Floats
+from cosmic.frame.arrays import Floats
 from cosmic.vico.core.vision.smoothing import arc_lengths, directions
 
 KINK_DEG = 10.0

@@ -12,9 +12,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.frame.arrays import ByteMask, Floats, Floats32
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.vision.graph import FREE, Graph, build_graph, prune
-from cosmic.vico.core.vision.grey import Floats, Floats32, Mask, grey_image, middle
+from cosmic.vico.core.vision.grey import grey_image, middle
 from cosmic.vico.core.vision.relief import Pieces, reduced
 from cosmic.vico.core.vision.smoothing import arc_lengths
 
@@ -157,7 +158,7 @@ def _ridges(small: Floats32) -> Floats32:
     return np.asarray(sides[int(np.argmax(strong))], dtype=np.float32)
 
 
-def _mask(ridges: Floats32, level: float) -> Mask:
+def _mask(ridges: Floats32, level: float) -> ByteMask:
     """Return where a ridge stands out, at a multiple of the usual threshold."""
     usual = max(NOISE_TIMES * middle(ridges), OF_STRONGEST * float(np.percentile(ridges, 99.0)))
     mask = (ridges > level * usual).astype(np.uint8)
@@ -168,7 +169,7 @@ def _mask(ridges: Floats32, level: float) -> Mask:
     return found.reshape(mask.shape)
 
 
-def _graph(mask: Mask) -> Graph:
+def _graph(mask: ByteMask) -> Graph:
     graph = build_graph(mask, MOST_FORKS)
     if graph is None:
         raise NotAvailable(

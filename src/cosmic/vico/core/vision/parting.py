@@ -15,10 +15,10 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cosmic.frame.arrays import ByteMask, Floats
 from cosmic.vico.core.vision import axial, checks
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.graph import build_graph, prune
-from cosmic.vico.core.vision.grey import Floats, Mask
 from cosmic.vico.core.vision.joining import AMBIGUOUS, FOLDED, Strand, strands
 from cosmic.vico.core.vision.profiles import Scene
 from cosmic.vico.core.vision.refine import Course, neighbours_of, refine
@@ -169,7 +169,7 @@ def _parts(scene: Scene, strand: Strand, least: float, depth: float) -> list[Str
     return near if len(near) <= MOST_PARTS else []
 
 
-def _mask(scene: Scene, low: np.ndarray, high: np.ndarray, depth: float) -> Mask:
+def _mask(scene: Scene, low: np.ndarray, high: np.ndarray, depth: float) -> ByteMask:
     part = cv2.GaussianBlur(scene.image[low[1] : high[1], low[0] : high[0]], (5, 5), 1.0)
     side = max(3, min(WIDEST_PX, int(0.6 * min(part.shape))) | 1)
     kind = cv2.MORPH_TOPHAT if scene.sign > 0 else cv2.MORPH_BLACKHAT

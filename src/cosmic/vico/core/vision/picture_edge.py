@@ -8,8 +8,9 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.frame.arrays import ByteMask, Floats
 from cosmic.vico.core.vision.ends import EndKind, bent, leaving
-from cosmic.vico.core.vision.grey import Floats, Mask, middle
+from cosmic.vico.core.vision.grey import middle
 from cosmic.vico.core.vision.profiles import Scene, sample
 from cosmic.vico.core.vision.refine import Course
 from cosmic.vico.core.vision.smoothing import directions
@@ -26,7 +27,7 @@ SOFT_PX: Final = 3.0
 """Over which the rim of a picture may be blurred by itself, to each side."""
 
 
-def is_cut(scene: Scene, course: Course, explained: Mask, *, compressed: bool) -> bool:
+def is_cut(scene: Scene, course: Course, explained: ByteMask, *, compressed: bool) -> bool:
     """Return whether the ground changes at a free end of a fibre, on both of its sides.
 
     Parameters
@@ -43,7 +44,9 @@ def is_cut(scene: Scene, course: Course, explained: Mask, *, compressed: bool) -
     )
 
 
-def _changes(scene: Scene, course: Course, at: int, explained: Mask, *, compressed: bool) -> bool:
+def _changes(
+    scene: Scene, course: Course, at: int, explained: ByteMask, *, compressed: bool
+) -> bool:
     line = course.line if at else course.line[::-1]
     size = max(6, round(0.8 * course.width))
     gap = round(SOFT_PX + course.edge_blur_px)
@@ -64,7 +67,7 @@ def _changes(scene: Scene, course: Course, at: int, explained: Mask, *, compress
     return not compressed and all(_goes_still(scene, side, size) for side in sides)
 
 
-def _side(scene: Scene, points: Floats, explained: Mask) -> Floats:
+def _side(scene: Scene, points: Floats, explained: ByteMask) -> Floats:
     """Return the ground at points (rows, columns, 2), NaN beyond the image and on fibres."""
     x, y = (points[..., axis].astype(np.float32) for axis in (0, 1))
     right, bottom = scene.corner

@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cosmic.frame.arrays import ByteMask, Floats
 from cosmic.vico.core.vision.checks import RUNS_ON
 from cosmic.vico.core.vision.ends import EndKind
-from cosmic.vico.core.vision.grey import Floats, Mask, middle, quantile
+from cosmic.vico.core.vision.grey import middle, quantile
 from cosmic.vico.core.vision.profiles import Scene, sample
 from cosmic.vico.core.vision.refine import Course
 
@@ -24,7 +25,7 @@ AHEAD: Final = 0.9
 """Cosine of how far off its direction a fibre may go on."""
 
 
-def in_pieces(scene: Scene, courses: Sequence[Course], explained: Mask) -> set[int]:
+def in_pieces(scene: Scene, courses: Sequence[Course], explained: ByteMask) -> set[int]:
     """Return the fibres that may be a piece of one, by other fibres and by what is left.
 
     Parameters
@@ -123,7 +124,7 @@ def _alike(one: float, other: float) -> bool:
     return ALIKE * other < one < other / ALIKE
 
 
-def broken_off(scene: Scene, courses: Sequence[Course], explained: Mask) -> set[int]:
+def broken_off(scene: Scene, courses: Sequence[Course], explained: ByteMask) -> set[int]:
     """Return the fibres behind an end of which lies a fragment as thick and dark as they are.
 
     Parameters
@@ -142,7 +143,7 @@ def broken_off(scene: Scene, courses: Sequence[Course], explained: Mask) -> set[
     }
 
 
-def _fragments(scene: Scene, explained: Mask, least: float) -> Iterator[Fragment]:
+def _fragments(scene: Scene, explained: ByteMask, least: float) -> Iterator[Fragment]:
     rest = ((scene.taken > 0) & (explained == 0)).view(np.uint8)
     _, labels, boxes, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
     depth = cv2.distanceTransform(rest, cv2.DIST_L2, 5)

@@ -7,7 +7,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.vico.core.vision.grey import Floats, Floats32, middle, middles
+from cosmic.frame.arrays import Floats, Floats32
+from cosmic.vico.core.vision.grey import middle, middles
 from cosmic.vico.core.vision.smoothing import directions, softened
 
 AT_ONCE: Final = 32000

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cosmic.frame.arrays import Floats, Floats32
 from cosmic.vico.core.vision.ends import End, EndKind, Level, find_end
-from cosmic.vico.core.vision.grey import Floats, Floats32, middle
+from cosmic.vico.core.vision.grey import middle
 from cosmic.vico.core.vision.joining import Strand
 from cosmic.vico.core.vision.profiles import (
     Edges,

@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.vico.core.vision.grey import Floats32, Mask, middle, middles, quantile
+from cosmic.frame.arrays import ByteMask, Floats32
+from cosmic.vico.core.vision.grey import middle, middles, quantile
 from cosmic.vico.hw.interface import Pixels
 
 # Wider bodies are tools, not fibres: the ground is what remains of them. Full-size pixels.
@@ -61,8 +62,8 @@ class Relief:
     factor: int
     lighter: bool
     height: Floats32
-    mask: Mask
-    hollow: Mask
+    mask: ByteMask
+    hollow: ByteMask
     crowded: bool
 
 
@@ -83,7 +84,7 @@ class Pieces:
     areas: npt.NDArray[np.intp]
 
     @classmethod
-    def of(cls, mask: Mask) -> "Pieces":
+    def of(cls, mask: ByteMask) -> "Pieces":
         """Return the pieces of a mask."""
         _, labels = cv2.connectedComponents(mask, connectivity=8)
         points = np.flatnonzero(mask != 0)  # of numbers it takes ten times as long as of flags
@@ -98,7 +99,7 @@ class Pieces:
         sums = np.add.reduceat(values.ravel()[self.order], self.firsts)
         return np.asarray(sums / self.areas, dtype=np.float32)
 
-    def deepest(self, mask: Mask) -> Floats32:
+    def deepest(self, mask: ByteMask) -> Floats32:
         """Return the largest distance to the outside in each piece."""
         framed = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
         depth = cv2.distanceTransform(framed, cv2.DIST_L2, 3)[1:-1, 1:-1]
@@ -122,7 +123,7 @@ class Raised:
     lighter: bool
     height: Floats32
     level: float
-    mask: Mask
+    mask: ByteMask
     pieces: Pieces
 
     @classmethod
@@ -146,7 +147,7 @@ def reduced(image: Pixels, factor: int) -> Floats32:
     return np.asarray(cv2.GaussianBlur(small.astype(np.float32), (3, 3), 0.7), dtype=np.float32)
 
 
-def kernel(side: int) -> Mask:
+def kernel(side: int) -> ByteMask:
     """Return a round kernel of odd size."""
     size = max(3, int(side) | 1)
     return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), dtype=np.uint8)
@@ -230,7 +231,7 @@ def threshold(height: Floats32, floor: float) -> float:
     return max(NOISE_TIMES * noise, floor)
 
 
-def ground_around(small: Floats32, covered: Sequence[Mask]) -> Floats32:
+def ground_around(small: Floats32, covered: Sequence[ByteMask]) -> Floats32:
     """Return the ground where nothing stands out, carried on below what does; nan far from any.
 
     As near as enough of it is seen, and again of what the first time has left, so that light that
@@ -279,7 +280,7 @@ def fibre_like(raised: Raised, away: Floats32) -> tuple[float, float]:
     return strong, strong / high if high else 0.0
 
 
-def lined(mask: Mask, other: Mask) -> bool:
+def lined(mask: ByteMask, other: ByteMask) -> bool:
     """Return whether a mask is but the inside of hollow fibres whose walls the other one has."""
     wide = np.ones((5, 5), np.uint8)
     rings = [(cv2.dilate(each, wide) > 0) & (each == 0) for each in (mask, other)]
@@ -290,7 +291,7 @@ def lined(mask: Mask, other: Mask) -> bool:
     return shares[0] > 0.5 and shares[0] > 1.2 * shares[1]
 
 
-def thresholded(raised: Raised) -> Mask:
+def thresholded(raised: Raised) -> ByteMask:
     """Return what stands out by half of its own strength, so that blur does not widen it."""
     mask, height, pieces = raised.mask, raised.height, raised.pieces
     if not len(pieces.areas):
@@ -311,7 +312,7 @@ def ranked(pieces: Pieces, height: Floats32) -> Floats32:
     return np.asarray(values[np.lexsort((values, number))])
 
 
-def insides(mask: Mask, widest: float) -> Mask:
+def insides(mask: ByteMask, widest: float) -> ByteMask:
     """Return the long narrow gaps between two walls: the inside of a hollow fibre."""
     edge = 16
     closed = cv2.morphologyEx(
@@ -330,7 +331,7 @@ def insides(mask: Mask, widest: float) -> Mask:
     return found.reshape(mask.shape)
 
 
-def ground_between(mask: Mask, hollow: Mask, away: Floats32, factor: int) -> Mask:
+def ground_between(mask: ByteMask, hollow: ByteMask, away: Floats32, factor: int) -> ByteMask:
     """Return the gaps that are ground between fibres of a row, and not the inside of one.
 
     Parameters

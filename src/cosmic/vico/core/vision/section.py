@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import erf
 
-from cosmic.vico.core.vision.grey import Floats, Floats32, middle
+from cosmic.frame.arrays import Floats, Floats32
+from cosmic.vico.core.vision.grey import middle
 from cosmic.vico.core.vision.profiles import Flags, Scene
 from cosmic.vico.core.vision.smoothing import directions
 

@@ -7,7 +7,7 @@ import numpy.typing as npt
 from scipy.linalg.lapack import dpbsv
 from scipy.ndimage import correlate1d, median_filter, minimum_filter1d
 
-from cosmic.vico.core.vision.grey import Floats
+from cosmic.frame.arrays import Floats
 
 ORDER = 3
 KERNEL_DEVIATIONS = 4.0

@@ -10,9 +10,9 @@ from typing import Final
 import cv2
 import numpy as np
 
+from cosmic.frame.arrays import Floats, Floats32
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.vico.core.vision.focal_stack import FocalStack, vertices
-from cosmic.vico.core.vision.grey import Floats, Floats32
 from cosmic.vico.core.vision.profiles import Flags
 from cosmic.vico.core.vision.smoothing import arc_lengths, resampled
 from cosmic.vico.hw.interface import Pixels
@@ -141,7 +141,7 @@ def in_space(
     if not (0.0 < view.scale_um_px < np.inf and view.distance_um > 0.0):
         raise ConfigError(
             f"heights: a scale of {view.scale_um_px} um/px and a distance of {view.distance_um} um "
-            "are no view"
+            "are not a view"
         )
     line = resampled(np.asarray(line_px, dtype=np.float64), STEP_PX)
     along = arc_lengths(line)

@@ -6,8 +6,8 @@ from typing import Final, TypeVar
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cosmic.frame.arrays import Floats
 from cosmic.vico.core.vision.fibre import Fibre
-from cosmic.vico.core.vision.grey import Floats
 from cosmic.vico.core.vision.smoothing import arc_lengths
 from cosmic.vico.core.vision.tool_types import ExpectedTool
 

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.renamed import Renamed
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.vision.grey import Floats
 from cosmic.vico.core.vision.tips import find_gripper, find_probe, find_shut_gripper
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen, ToolEnd
 from cosmic.vico.hw.interface import Pixels

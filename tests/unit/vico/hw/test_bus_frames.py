@@ -2,7 +2,7 @@
 
 import pytest
 
-from cosmic.vico.hw.camera_frames import FrameNumbers, FrameTimes
+from cosmic.vico.hw.bus_frames import FrameNumbers, FrameTimes
 
 
 def missing(given: list[int]) -> int:

@@ -1,4 +1,4 @@
-"""Numbers, buffers and pixels of frames, as the drivers of real cameras need them."""
+"""Numbers, times, buffers and colours of frames that come over a bus, for drivers of cameras."""
 
 import ctypes
 import math

@@ -3,12 +3,7 @@
 from cosmic.autonomy.handling.approach import Turn
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.grasp import Carry
-from cosmic.autonomy.handling.marked import ChooseMarked, MarkedFibre
-from cosmic.autonomy.handling.prepare import make_safe
-from cosmic.autonomy.handling.push import NO_CONTACT, Retract, StepBack
-from cosmic.autonomy.handling.put_away import Finish, GiveUp, NoteFailure
-from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.handling.single_operations import (
+from cosmic.autonomy.handling.manual_operations import (
     AtProbe,
     CarryBack,
     CloseGently,
@@ -19,6 +14,11 @@ from cosmic.autonomy.handling.single_operations import (
     PushToForce,
     StandOff,
 )
+from cosmic.autonomy.handling.marked import ChooseMarked, MarkedFibre
+from cosmic.autonomy.handling.prepare import make_safe
+from cosmic.autonomy.handling.push import NO_CONTACT, Retract, StepBack
+from cosmic.autonomy.handling.put_away import Finish, GiveUp, NoteFailure
+from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.combinators import Fallback, Retry, Sequence
 from cosmic.autonomy.procedures.procedure import Part, Procedure
 from cosmic.autonomy.shipped.bend_test import PUSHES, beginning, grasped, measured, put_away

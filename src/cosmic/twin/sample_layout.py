@@ -4,15 +4,13 @@ import math
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from cosmic.frame.arrays import Floats
 from cosmic.frame.errors import ConfigError
 from cosmic.twin.force_settings import FibreSettings, Role
 from cosmic.twin.optics.shapes import lying
 from cosmic.twin.sample_settings import SampleSettings
 from cosmic.twin.settings import TwinSettings
-
-Floats = npt.NDArray[np.float64]
 
 TRIES: Final = 4000
 """Positions tried for one fibre before the plate is called full."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass(slots=True)
-class Touch:
+class ProbeContact:
     """Whether the probe pushes against a body.
 
     A stage can carry the probe right through a fibre between two looks. What counts is therefore

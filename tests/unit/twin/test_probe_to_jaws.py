@@ -5,8 +5,8 @@ import random
 
 import pytest
 
-from cosmic.twin.clearance import Clearance
 from cosmic.twin.kinematics import Slide
+from cosmic.twin.probe_to_jaws import ProbeToJaws
 from unit.twin.force_bench import FIBRE, Bench, Heard, settings
 
 PROBE = Slide((0.0, 900.0, 100.0), (("p.x", (1.0, 0.0, 0.0)), ("p.y", (0.0, 1.0, 0.0))))
@@ -22,7 +22,7 @@ def nearest_um(values: dict[str, float]) -> float:
 @pytest.mark.parametrize("seed", range(20))
 def test_no_less_is_left_than_there_is(seed: int) -> None:
     chance = random.Random(seed)
-    clear, values = Clearance([PROBE, JAW], ["j.gripper"]), dict.fromkeys(STAGES, 0.0)
+    clear, values = ProbeToJaws([PROBE, JAW], ["j.gripper"]), dict.fromkeys(STAGES, 0.0)
     clear.begin(values, 0.0, nearest_um(values))
     for _ in range(30):
         values = {name: at + chance.gauss(0.0, 5.0) for name, at in values.items()}
@@ -33,7 +33,7 @@ def test_no_less_is_left_than_there_is(seed: int) -> None:
 
 
 def test_drift_counts_and_what_is_not_known_is_nothing() -> None:
-    clear, values = Clearance([PROBE, JAW], []), dict.fromkeys(STAGES, 0.0)
+    clear, values = ProbeToJaws([PROBE, JAW], []), dict.fromkeys(STAGES, 0.0)
     assert clear.left_um == 0.0 and not clear.passed
     clear.begin(values, 1.0, 50.0)
     assert clear.after_um(values, 3.0, 2.0) == 50.0 - 2.0 * 2.0 * 2.0

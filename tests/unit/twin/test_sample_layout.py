@@ -7,7 +7,7 @@ import pytest
 
 from cosmic.frame.errors import ConfigError
 from cosmic.twin.force_settings import FibreSettings
-from cosmic.twin.sample import centre_line_um, dense, put_on
+from cosmic.twin.sample_layout import centre_line_um, dense, put_on
 from cosmic.twin.settings import TwinSettings, shipped_settings
 
 SHIPPED = shipped_settings()

@@ -1,4 +1,4 @@
-"""The shape that plans of bluesky expect of a camera: a part of `CameraHandle`."""
+"""`PlanCamera`: a camera as plans of bluesky read it; a part of `CameraHandle`."""
 
 import math
 import re
@@ -43,7 +43,7 @@ MEASURES: Final[Mapping[str, str]] = {"length_um": "um", "width_um": "um", "curl
 
 
 @checked_class
-class CameraShape:
+class PlanCamera:
     """Readable, Configurable, Triggerable, Stageable and WritesExternalAssets, without bluesky.
 
     Images that are kept as TIFF reach what reads documents, such as tiled, as a stream resource of
@@ -139,12 +139,12 @@ class CameraShape:
         self._folder, self._suffix, self._fibres, self._last = chosen, suffix, fibres, None
         self._number = 0 if chosen is None else _last_number(chosen, self.name)
 
-    def stage(self) -> "list[CameraShape]":
+    def stage(self) -> "list[PlanCamera]":
         """Begin a run of plans: its images are a resource of their own."""
         self._assets, self._resource = (), ""
         return [self]
 
-    def unstage(self) -> "list[CameraShape]":
+    def unstage(self) -> "list[PlanCamera]":
         """End it; the camera stays as it is."""
         self._assets, self._resource = (), ""
         return [self]

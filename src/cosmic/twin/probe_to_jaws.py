@@ -10,7 +10,7 @@ from operator import sub
 from cosmic.twin.kinematics import Slide
 
 
-class Clearance:
+class ProbeToJaws:
     """What is left of a distance while stages go on.
 
     Parameters

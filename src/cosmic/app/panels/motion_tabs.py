@@ -1,4 +1,4 @@
-"""The panels of what MiCo does by itself or under other hands: SCM, teleoperation, loops."""
+"""Tabs of what moves axes by itself or by another hand: trajectories, teleoperation, loops."""
 
 from typing import Final
 
@@ -18,7 +18,7 @@ TELEOPERATION: Final = "Teleoperation"
 CONTROL: Final = "Control loop"
 
 
-class ProcedurePanels:
+class MotionTabs:
     """Trajectories, teleoperation and control loops, in tabs with another panel; GUI thread.
 
     Each is made when it is first seen or asked for.

@@ -1,10 +1,10 @@
 """Contact that remembers its side."""
 
-from cosmic.twin.touch import Touch
+from cosmic.twin.probe_contact import ProbeContact
 
 
 def look(*places: tuple[float, float]) -> list[bool]:
-    touch = Touch()
+    touch = ProbeContact()
     return [touch.look(reach, way) for reach, way in places]
 
 
@@ -38,7 +38,7 @@ def test_of_two_crossings_in_one_step_the_first_counts() -> None:
 
 
 def test_a_lost_touch_is_not_found_again_from_behind() -> None:
-    touch = Touch()
+    touch = ProbeContact()
     touch.look(10.0, -1.0)
     assert touch.look(10.0, 50.0)
     touch.lose()
