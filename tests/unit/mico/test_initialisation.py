@@ -94,7 +94,7 @@ def test_an_axis_that_is_not_connected_is_left_out_and_the_step_says_so():
         ({"do": "reference", "axes": ["nobody"]}, "no positioner 'nobody'"),
         ({"do": "reference", "group": "none"}, "no group 'none'"),
         ({"do": "reference", "axes": ["d0.c2"]}, "d0.c2 has no sensor"),
-        ({"do": "open_gripper", "axes": ["d0.c0"]}, "d0.c0 is no gripper"),
+        ({"do": "open_gripper", "axes": ["d0.c0"]}, "d0.c0 is not a gripper"),
         ({"do": "end_stop", "axes": ["d0.c0"]}, "direction is missing"),
         ({"do": "wait"}, "wait_s is missing"),
         ({"do": "confirm"}, "text is missing"),

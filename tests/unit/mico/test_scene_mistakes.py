@@ -50,8 +50,8 @@ URDF_MISTAKES = {
     "no type": ({' type="revolute"': ""}, "joint 'turn': <joint> has no 'type'"),
     "an unknown shape": ({"<cylinder": "<capsule"}, "link 'table'.*needs one <geometry>"),
     "no shape": ({'<cylinder radius="0.003" length="0.002"/>': ""}, "needs one <geometry>"),
-    "an unknown child": ({'child link="slider"': 'child link="slyder"'}, "'slyder' is no link"),
-    "an unknown parent": ({SLIDE: SLIDE.replace("base", "bass")}, "parent 'bass' is no link"),
+    "an unknown child": ({'child link="slider"': 'child link="slyder"'}, "'slyder' is not a link"),
+    "an unknown parent": ({SLIDE: SLIDE.replace("base", "bass")}, "parent 'bass' is not a link"),
     "a link twice": ({'link name="table"': 'link name="slider"'}, "'slider' is there 2 times"),
     "a joint twice": ({'joint name="turn"': 'joint name="slide"'}, "'slide' is there 2 times"),
     "a child with two parents": (
@@ -128,10 +128,10 @@ def test_a_file_is_not_read_through_an_entity(tmp_path: Path) -> None:
 
 
 SRDF_MISTAKES = {
-    "an unknown link": ({'link1="base"': 'link1="bass"'}, "'bass' is no link"),
+    "an unknown link": ({'link1="base"': 'link1="bass"'}, "'bass' is not a link"),
     "no reason": ({' reason="Adjacent"': ""}, "base and table may touch, but no reason"),
     "one link": ({' link2="table"': ""}, "needs link1 and link2"),
-    "a link with itself": ({'link2="table"': 'link2="base"'}, "with itself is no pair"),
+    "a link with itself": ({'link2="table"': 'link2="base"'}, "with itself is not a pair"),
 }
 
 
@@ -146,7 +146,7 @@ def test_an_srdf_is_refused_with(tmp_path: Path, name: str) -> None:
 LIFT = '[[drive]]\naxis = "other"\njoint = '
 TOML_MISTAKES = {
     "an unknown key": ("speed = 3\n", "unknown key"),
-    "an unknown joint": (f'{LIFT}"slyde"\n', "'slyde' is no joint that moves; there are slide"),
+    "an unknown joint": (f'{LIFT}"slyde"\n', "'slyde' is not a joint that moves; there are slide"),
     "a joint driven twice": (f'{LIFT}"slide"\n', "'slide' is driven by lift already"),
     "a factor of 0": ("factor = 0.0\n", "factor: 0 would move nothing"),
     "a factor that is nan": ("factor = nan\n", "drive.1..factor"),
@@ -159,7 +159,7 @@ TOML_MISTAKES = {
     "detour out of reach": ("[detour]\nlift = -7000.0\n", "detour: lift = -7000 is outside"),
     "margin of an unknown link": (
         '[[margin]]\nbodies = ["base", "bass"]\nmargin_um = 1.0\n',
-        "margin[0]: 'bass' is no link",
+        "margin[0]: 'bass' is not a link",
     ),
     "margin of a pair that is not watched": (
         '[[margin]]\nbodies = ["base", "table"]\nmargin_um = 1.0\n',
@@ -167,13 +167,13 @@ TOML_MISTAKES = {
     ),
     "contact of an unknown link": (
         '[[contact]]\noperation = "a"\npairs = [["base", "bass"]]\nreason = "b"\n',
-        "contact[0] (a): 'bass' is no link",
+        "contact[0] (a): 'bass' is not a link",
     ),
     "contact without reason": (
         '[[contact]]\noperation = "a"\npairs = [["base", "slider"]]\nreason = ""\n',
         "contact[0].reason",
     ),
-    "exchange of an unknown link": ('[exchange]\nslyder = "a.urdf"\n', "'slyder' is no link"),
+    "exchange of an unknown link": ('[exchange]\nslyder = "a.urdf"\n', "'slyder' is not a link"),
     "exchange by a missing file": (
         '[exchange]\nslider = "a.urdf"\n',
         "a.urdf: there is no such file",
@@ -302,4 +302,4 @@ def test_elements_that_are_not_used_are_warned_of(tmp_path: Path) -> None:
 
 def test_a_hash_of_a_file_that_is_not_used_is_warned_of(tmp_path: Path) -> None:
     path = write_scene(tmp_path, more=f'[sha256]\n"old.stl" = "{"0" * 64}"\n')
-    assert "sha256: 'old.stl' is no file of this scene" in warnings(path)
+    assert "sha256: 'old.stl' is not a file of this scene" in warnings(path)

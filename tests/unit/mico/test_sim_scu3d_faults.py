@@ -180,7 +180,7 @@ def test_the_hand_control_unit_overrides_with_133_instead_of_completed(client: C
     client.ok("MoveStep_A", 0, 2, 30_000, 1000, 1000)
     assert client.settle() == [error(133, 2)]
     client.ok("SetAmplitude_A", 0, 2, 500)
-    assert client.settle() == [], "setting an amplitude is no movement"
+    assert client.settle() == [], "setting an amplitude is not a movement"
     client.library.faults.clear("overridden")
     client.ok("MovePositionAbsolute_A", 0, 1, 0, FOR_EVER)
     assert client.settle() == [Packet(COMPLETED, 1, 0, 0, 0)]

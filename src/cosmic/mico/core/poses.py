@@ -38,7 +38,7 @@ def check_pose_name(name: str) -> str:
     """Return `name`; raises `NotAvailable` where it is none for a pose."""
     if not NAME.fullmatch(name) or name != name.strip():
         raise NotAvailable(
-            f"{name[:80]!r} is no name of a pose: up to 80 letters, digits, spaces and . - _"
+            f"{name[:80]!r} is not a name of a pose: up to 80 letters, digits, spaces and . - _"
         )
     return name
 
@@ -132,10 +132,10 @@ def read_poses(path: Path) -> dict[str, Pose]:
     poses: dict[str, Pose] = {}
     for name, table in read_toml(path).items():
         if not NAME.fullmatch(name) or not isinstance(table, dict) or not table:
-            raise ConfigError(f"{path}: {name}: is no pose: [name] and a position for each axis")
+            raise ConfigError(f"{path}: {name}: is not a pose: [name] and a position for each axis")
         for axis, value in table.items():
             if not _is_position(value):
-                raise ConfigError(f"{path}: {name}.{axis}: {reprlib.repr(value)} is no position")
+                raise ConfigError(f"{path}: {name}.{axis}: {reprlib.repr(value)} is not a position")
         poses[name] = Pose(name, {axis: float(value) for axis, value in table.items()})
     return poses
 

@@ -372,7 +372,7 @@ def _recording_text(recording: TrajectoryRecording) -> str:
 
 
 def _lines_of(path: Path) -> list[str]:
-    """Return what can be shown of a file that is no trajectory."""
+    """Return what can be shown of a file that is not a trajectory."""
     try:
         with open_file(path) as file:
             data = file.read(LARGEST_BYTES)

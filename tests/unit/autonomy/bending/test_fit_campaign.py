@@ -221,6 +221,7 @@ CAUSES = {
     Quality.RELAXED: {"relaxation": (0.12, 0.0)},
     Quality.SET: {"yield_strain": (0.001, 0.0), "set_part": 0.5},
     Quality.HINGE: {"weak": 1.0},
+    Quality.NON_UNIFORM: {"ei_cv": 0.5},
     Quality.FRICTION: {"friction": (0.7, 0.7)},
     Quality.CLAMP_DEEP: {"clamp": ("log", 110.0, 0.0)},
     Quality.MOVED: {"moved": 1.0},
@@ -238,6 +239,19 @@ def test_a_cause_is_named_where_it_acts(cause: Quality) -> None:
     for found in fit_campaign(kept, settings=settings):
         named += cause in found.flags | found.notes
     assert named >= 3
+
+
+@pytest.mark.parametrize(
+    ("change", "weak_ones"), [({"weak": 1.0}, range(10, 13)), ({"ei_cv": 0.5}, range(3))]
+)
+def test_a_weak_place_is_told_from_a_fibre_that_is_uneven_all_along(
+    change: dict[str, float], weak_ones: range
+) -> None:
+    session = Session(dataclasses.replace(WORLD, **change), np.random.default_rng(33))
+    kept = [measured(session, Fibre.drawn(session), FitSettings()) for _ in range(12)]
+    seen = [each.flags | each.notes for each in fit_campaign(kept)]
+    assert sum(Quality.HINGE in each for each in seen) in weak_ones
+    assert sum(bool(each & {Quality.HINGE, Quality.NON_UNIFORM}) for each in seen) >= 9
 
 
 def test_a_quiet_fibre_has_nothing_to_name() -> None:

@@ -141,7 +141,7 @@ def _collision_object(shape: Shape) -> fcl.CollisionObject:
     # python-fcl checks nothing: a face beyond the vertices ends the process.
     whole = len(vertices) >= 4 and len(faces) >= 4 and np.isfinite(vertices).all()
     if not whole or not (faces.min() >= 0 and faces.max() < len(vertices)):
-        raise ValueError(f"{shape.name} is no closed mesh")
+        raise ValueError(f"{shape.name} is not a closed mesh")
     geometry = fcl.BVHModel()
     geometry.beginModel(len(vertices), len(faces))
     geometry.addSubModel(vertices, faces)

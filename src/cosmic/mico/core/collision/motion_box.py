@@ -108,7 +108,7 @@ _REST: Final[_Row] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 def _check(axis: str, span: AxisSpan, model: SceneModel) -> None:
     now = 0.0 if span.now is None else span.now
     if not (span.low <= span.high and math.isfinite(now)):
-        raise SpanError(f"{axis}: {span.low} to {span.high} at {span.now} is no interval")
+        raise SpanError(f"{axis}: {span.low} to {span.high} at {span.now} is not an interval")
     if span.moving and not span.free and axis not in model.axes:
         raise SpanError(f"{axis} moves nothing in the scene {model.name}; describe its bodies")
 

@@ -38,7 +38,7 @@ class SceneFiles:
         """Warn of hashes of files that nothing reads."""
         for path, name in self._names.items():
             if path not in self._read:
-                self._findings.odd(where, f"sha256: {name!r} is no file of this scene")
+                self._findings.odd(where, f"sha256: {name!r} is not a file of this scene")
 
     def _read_once(self, path: Path, asked_by: str) -> bytes | None:
         try:

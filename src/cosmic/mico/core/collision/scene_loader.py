@@ -126,7 +126,7 @@ class _Reading:
         for tool in (*described, *settings.tool):
             if tool.link not in bodies:
                 where = f"{self._path}: tool {tool.name!r}"
-                self._findings.wrong(where, f"{tool.link!r} is no link of the URDF")
+                self._findings.wrong(where, f"{tool.link!r} is not a link of the URDF")
                 continue
             frame = np.eye(4)
             frame[:3, :3] = turned(*(math.radians(each) for each in tool.rpy_deg))
@@ -136,7 +136,7 @@ class _Reading:
 
     def _plate(self, settings: SceneSettings, bodies: Collection[str]) -> str:
         if settings.plate and settings.plate not in bodies:
-            text = f"{settings.plate!r} is no link of the URDF"
+            text = f"{settings.plate!r} is not a link of the URDF"
             self._findings.wrong(f"{self._path}: plate", text)
         return settings.plate
 
@@ -159,7 +159,7 @@ class _Reading:
         names = {link.name for link in described.links}
         for name in settings.exchange.keys() - names:
             self._findings.wrong(
-                f"{self._path}: exchange", f"{name!r} is no link of the URDF; is it misspelt?"
+                f"{self._path}: exchange", f"{name!r} is not a link of the URDF; is it misspelt?"
             )
         shapes = []
         for link in described.links:
@@ -196,7 +196,7 @@ def _drives(
         joint = by_name.get(each.joint)
         if joint is None or joint.kind is JointKind.FIXED:
             known = ", ".join(j.name for j in joints if j.kind is not JointKind.FIXED)
-            findings.wrong(where, f"{each.joint!r} is no joint that moves; there are {known}")
+            findings.wrong(where, f"{each.joint!r} is not a joint that moves; there are {known}")
             continue
         if each.joint in taken:
             findings.wrong(where, f"joint {each.joint!r} is driven by {taken[each.joint]} already")

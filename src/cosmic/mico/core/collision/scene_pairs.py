@@ -97,9 +97,9 @@ class Pairing:
     def _known(self, links: tuple[str, str], where: str) -> BodyPair | None:
         unknown = [name for name in links if name not in self._bodies]
         for name in unknown:
-            self._findings.wrong(where, f"{name!r} is no link of the URDF; is it misspelt?")
+            self._findings.wrong(where, f"{name!r} is not a link of the URDF; is it misspelt?")
         if links[0] == links[1]:
-            self._findings.wrong(where, f"{links[0]!r} with itself is no pair")
+            self._findings.wrong(where, f"{links[0]!r} with itself is not a pair")
             return None
         return None if unknown else pair_of(*links)
 

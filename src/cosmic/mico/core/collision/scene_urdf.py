@@ -225,7 +225,7 @@ def _check_ends(described: Description, links: set[str], file: XmlFile, findings
     for text in described.joints:
         for role, name in (("parent", text.parent), ("child", text.child)):
             if name not in links:
-                findings.wrong(file.place_of_joint(text.name), f"its {role} {name!r} is no link")
+                findings.wrong(file.place_of_joint(text.name), f"its {role} {name!r} is not a link")
         if text.parent == text.child:
             findings.wrong(file.place_of_joint(text.name), "its parent is its own child")
 
@@ -253,7 +253,7 @@ def _checked_joint(text: JointText, file: XmlFile, findings: Findings) -> Joint 
         and np.allclose(turn @ turn.T, np.eye(3), rtol=0.0, atol=1e-9)
         and np.linalg.det(turn) > 0.0
     ):
-        findings.wrong(where, "its origin is no rotation and translation")
+        findings.wrong(where, "its origin is not a rotation and translation")
         return None
     if text.kind is not JointKind.FIXED and not text.low < text.high:
         findings.wrong(where, "its lower limit is not below its upper one")

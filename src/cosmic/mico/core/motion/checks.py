@@ -187,7 +187,7 @@ def malformed(motion: Motion, state: PositionerState) -> MoveVerdict | None:
         case ToEndStop():
             fine, text = isinstance(motion.direction, Direction), f"{name}: no direction is given"
         case _:
-            fine, text = type(motion) in MOTION_WORDS, f"{name}: {motion!r} is no movement"
+            fine, text = type(motion) in MOTION_WORDS, f"{name}: {motion!r} is not a movement"
     return None if fine else refuse(Reason.NOT_FINITE, text, axis=name)
 
 

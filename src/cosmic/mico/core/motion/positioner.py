@@ -438,7 +438,7 @@ def check_estimate(
     if state.in_motion or not state.activity.at_rest:
         raise NotAvailable(f"{state.name}: it is moving; set the estimate when it is stationary")
     if not (math.isfinite(position) and std >= 0.0):
-        text = f"{state.name}: {position!r} ± {std!r} is no estimate"
+        text = f"{state.name}: {position!r} ± {std!r} is not an estimate"
         raise refusal(refuse(Reason.NOT_FINITE, text, axis=state.name))
     if not travel.low <= position <= travel.high:
         limit = (travel.low if position < travel.low else travel.high) - state.zero

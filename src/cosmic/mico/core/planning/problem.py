@@ -127,7 +127,7 @@ def validate(model: SceneModel, problem: Problem) -> None:
         A target lies outside its limits.
     """
     if not 0.0 < problem.budget_s <= LONGEST_S:
-        text = f"{problem.budget_s!r} s is no time to plan a path in; give up to {LONGEST_S:g} s"
+        text = f"{problem.budget_s!r} s is not a time to plan a path in; give up to {LONGEST_S:g} s"
         raise refusal(refuse(Reason.NOT_FINITE, text))
     for axis in (*problem.goal, *problem.start):
         if axis not in model.axes:
@@ -150,7 +150,7 @@ def validate(model: SceneModel, problem: Problem) -> None:
 def _finite(axis: str, value: float, what: str) -> None:
     if not math.isfinite(value):
         raise refusal(
-            refuse(Reason.NOT_FINITE, f"{axis} {what} {value!r}, which is no position", axis=axis)
+            refuse(Reason.NOT_FINITE, f"{axis} {what} {value!r}: not a position", axis=axis)
         )
 
 

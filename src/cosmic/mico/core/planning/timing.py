@@ -157,5 +157,5 @@ def timed(plan: Plan, top_speed: Mapping[str, float], acceleration: Mapping[str,
 def _positive(values: Mapping[str, float], axis: str) -> float:
     value = values.get(axis, float("nan"))
     if not 0.0 < value < float("inf"):
-        raise NotAvailable(f"{axis}: {value!r} per second is no top speed or acceleration")
+        raise NotAvailable(f"{axis}: {value!r} per second is not a top speed or acceleration")
     return value

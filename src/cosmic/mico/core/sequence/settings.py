@@ -142,7 +142,7 @@ def _wrong_kinds(step: StepSettings, kinds: dict[str, str]) -> list[str]:
         lines = [f"{name} has no sensor: it cannot {step.do.replace('_', ' ')}" for name in wrong]
     elif step.kind.moves:
         wrong = [name for name in known if kinds[name] != "open-loop"]
-        lines = [f"{name} is no gripper: it has a sensor" for name in wrong]
+        lines = [f"{name} is not a gripper: it has a sensor" for name in wrong]
     else:
         return []
     for key, kind in (("targets_um", "linear"), ("targets_deg", "rotary")):

@@ -151,7 +151,7 @@ class TrajectoryReader:
         parts = said.split()
         if len(parts) != 2 or parts[0] != "cosmic-trajectory":
             raise QuantityError(
-                f"this is no trajectory: the first line of one is 'cosmic-trajectory {VERSION}'"
+                f"this is not a trajectory: the first line of one is 'cosmic-trajectory {VERSION}'"
             )
         if words.whole(parts[1], "a version") != VERSION:
             raise QuantityError(
@@ -276,7 +276,7 @@ class TrajectoryReader:
             raise QuantityError("write it as: steps left.gripper -100 100 V 1000 Hz")
         hertz = None if match[3] is None else words.quantity(match[3], "Hz")
         if hertz is not None and hertz != round(hertz):
-            raise QuantityError(f"{match[3]!r} is no whole number of Hz")
+            raise QuantityError(f"{match[3]!r} is not a whole number of Hz")
         return Steps(
             axis=words.axis_name(name),
             steps=words.whole(match[1], "steps"),
@@ -336,7 +336,7 @@ def parse(
 
 def _decoded(data: bytes | str, name: str) -> str:
     if len(data) > LARGEST_BYTES:
-        size = f"is larger than {LARGEST_BYTES // 2**20} MB, which is no trajectory"
+        size = f"is larger than {LARGEST_BYTES // 2**20} MB, which is not a trajectory"
         raise TrajectoryError(name, [Problem(0, size)])
     try:
         text = data.decode("utf-8-sig") if isinstance(data, bytes) else data

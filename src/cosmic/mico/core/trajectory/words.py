@@ -34,7 +34,7 @@ def position(text: str) -> tuple[float, AxisUnit]:
         if "not a unit" not in str(exc):
             raise
         raise QuantityError(
-            f"{text!r}: this is no unit of a position; use um, mm, nm, deg or mdeg"
+            f"{text!r}: this is not a unit of a position; use um, mm, nm, deg or mdeg"
         ) from None
 
 
@@ -50,21 +50,21 @@ def time_s(text: str) -> float:
     match = _TIME.fullmatch(text)
     value = float(match[1]) * _TO_S[match[2]] if match else math.nan
     if not 0.0 <= value <= LONGEST_S:
-        raise QuantityError(f"{text!r} is no time from 0 to a day; write it as 0.5 s")
+        raise QuantityError(f"{text!r} is not a time from 0 to a day; write it as 0.5 s")
     return value
 
 
 def whole(text: str, what: str) -> int:
     """Read a whole number; raises `QuantityError`."""
     if not _WHOLE.fullmatch(text):
-        raise QuantityError(f"{text!r} is no whole number of {what}")
+        raise QuantityError(f"{text!r} is not a whole number of {what}")
     return int(text)
 
 
 def axis_name(text: str) -> str:
     """Return the name of an axis; raises `QuantityError`."""
     if not AXIS_PATTERN.fullmatch(text):
-        raise QuantityError(f"{text!r} is no name of an axis, such as left.x")
+        raise QuantityError(f"{text!r} is not a name of an axis, such as left.x")
     return text
 
 
@@ -72,7 +72,7 @@ def free_name(text: str, what: str) -> str:
     """Return the name of a platform or a pose; raises `QuantityError`."""
     if len(text) > 80 or not _NAME.fullmatch(text):
         raise QuantityError(
-            f"{text[:80]!r} is no name of a {what}: up to 80 letters, digits, spaces and . - _"
+            f"{text[:80]!r} is not a name of a {what}: up to 80 letters, digits, spaces and . - _"
         )
     return text
 
