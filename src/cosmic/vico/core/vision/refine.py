@@ -24,6 +24,9 @@ STEP_PX = 2.0
 # So far beyond the border a line may be smoothed.
 STRAY_PX = 30.0
 ROUNDS = 2
+# Of an end that was drawn: how far off it may be, and over which length it falls, by its blur.
+DRAWN_END_PX = 0.3
+SOFT_OF_BLUR = 1.68
 
 
 @dataclass(slots=True, eq=False)
@@ -38,6 +41,8 @@ class Course:
         Where both edges were seen.
     free : ndarray of bool, shape (n,)
         Where nothing else known covers the cross section.
+    alone : Scene or None
+        Of a fibre of a bundle: the image without the others.
     widths : ndarray, shape (n,)
         NaN where they were not.
     """
@@ -56,6 +61,7 @@ class Course:
     ground: Floats = field(default_factory=lambda: np.zeros(0))
     tilt: Floats = field(default_factory=lambda: np.zeros(0))
     free: Flags = field(default_factory=lambda: np.zeros(0, bool))
+    alone: Scene | None = None
 
     @property
     def edge_blur_px(self) -> float:
@@ -123,6 +129,27 @@ def _refined(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | N
         if len(course.line) < 6:
             return None
     return course if measure(scene, course, neighbours) else None
+
+
+def lying(
+    scene: Scene, line: Floats, width: float, blur_px: float, neighbours: Neighbours
+) -> Course | None:
+    """Return the course of a fibre of which it is known where it lies; `scene` has it alone."""
+    line = resampled(line, STEP_PX)
+    if len(line) < 6:
+        return None
+    course = Course(
+        line, width, np.ones(len(line), bool), np.full(len(line), width), np.ones(len(line)), []
+    )
+    course.blur_px, course.alone = blur_px, scene
+    course.ends = [End(EndKind.FREE, 0.0, DRAWN_END_PX, SOFT_OF_BLUR * blur_px)] * 2
+    try:
+        seen = measure(scene, course, neighbours)
+    except UndeterminedError:
+        return None
+    # Where it is not seen a line that follows what is seen goes astray.
+    course.line = line
+    return course if seen else None
 
 
 def first_line(scene: Scene, strand: Strand, wave_px: float) -> Floats:
