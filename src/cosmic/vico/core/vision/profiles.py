@@ -55,6 +55,8 @@ class Edges:
         Height of each cross section.
     mean : ndarray, shape (m,)
         The typical cross section, 1 at its highest.
+    cut : bool
+        Whether it has not fallen to half of its height where other things cover what is beside it.
     """
 
     left: Floats
@@ -62,6 +64,7 @@ class Edges:
     contrast: Floats
     mean: Floats
     steepness_px: float
+    cut: bool = False
 
 
 def sample(image: Floats32, x: Floats32, y: Floats32) -> Floats32:
@@ -241,7 +244,19 @@ def find_edges(profiles: Profiles, height: Floats32, good: Flags, width: float) 
     inner = [level_crossing(mean, across, 0.75, side) for side in (-1, 1)]
     outer = [level_crossing(mean, across, 0.25, side) for side in (-1, 1)]
     steep = float(np.nanmean(np.abs(np.subtract(outer, inner)))) if np.isfinite(inner).any() else 0
-    return Edges(found[0], found[1], contrast, mean, steep / 1.349)
+    cut = any(
+        _is_cut(profiles, good, point, side) for point, side in zip(expected, (-1, 1), strict=True)
+    )
+    return Edges(found[0], found[1], contrast, mean, steep / 1.349, cut)
+
+
+def _is_cut(profiles: Profiles, good: Flags, point: float, side: int) -> bool:
+    """Return whether what lies right beyond an edge is covered on most of the length."""
+    beyond = np.flatnonzero(side * (profiles.across - point) > 0.0)
+    if not len(beyond) or not good.any():
+        return False
+    column = profiles.clear[good, beyond[0] if side > 0 else beyond[-1]]
+    return float(column.mean()) < 0.5
 
 
 def edge_near(

@@ -24,6 +24,8 @@ STEP_PX = 2.0
 # So far beyond the border a line may be smoothed.
 STRAY_PX = 30.0
 ROUNDS = 2
+# So far apart, in pixels of the reduced image, the points of a strand are not beside each other.
+GAP = 2.0
 # Of an end that was drawn: how far off it may be, and over which length it falls, by its blur.
 DRAWN_END_PX = 0.3
 SOFT_OF_BLUR = 1.68
@@ -41,6 +43,8 @@ class Course:
         Where both edges were seen.
     free : ndarray of bool, shape (n,)
         Where nothing else known covers the cross section.
+    cut : bool
+        Its edges are not seen: other things cover what is beside it before it has fallen.
     alone : Scene or None
         Of a fibre of a bundle: the image without the others.
     widths : ndarray, shape (n,)
@@ -61,6 +65,7 @@ class Course:
     ground: Floats = field(default_factory=lambda: np.zeros(0))
     tilt: Floats = field(default_factory=lambda: np.zeros(0))
     free: Flags = field(default_factory=lambda: np.zeros(0, bool))
+    cut: bool = False
     alone: Scene | None = None
 
     @property
@@ -91,9 +96,10 @@ def neighbours_of(scene: Scene, kept: list[Strand], index: int) -> Neighbours:
     low, high = own.min(axis=0) - reach, own.max(axis=0) + reach
     others = []
     for n, each in enumerate(kept):
-        inside = ((each.points > low) & (each.points < high)).all(axis=1)
+        points = without_gaps(each.points)
+        inside = ((points > low) & (points < high)).all(axis=1)
         if n != index and inside.any():
-            others.append((each, scene.full(each.points[inside])))
+            others.append((each, scene.full(points[inside])))
     if not others:
         return Neighbours(None, np.zeros(0))
     points = np.concatenate([line for _, line in others])
@@ -101,6 +107,18 @@ def neighbours_of(scene: Scene, kept: list[Strand], index: int) -> Neighbours:
         [np.full(len(line), each.half_width * scene.factor) for each, line in others]
     )
     return Neighbours(cKDTree(points), margins)
+
+
+def without_gaps(points: Floats) -> Floats:
+    """Return the points of a strand and, where it goes through a crossing, those between.
+
+    Without them what it covers there would be taken for free.
+    """
+    s = arc_lengths(points)
+    if len(points) < 2 or not np.diff(s).max() > GAP:
+        return points
+    at = np.linspace(0.0, float(s[-1]), int(np.ceil(s[-1])) + 1)
+    return np.column_stack([np.interp(at, s, points[:, axis]) for axis in (0, 1)])
 
 
 def refine(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | None:
@@ -272,6 +290,7 @@ def take(course: Course, edges: Edges, widths: Floats, good: Flags, profiles: Pr
     course.tilt = profiles.tilt
     course.blur_px = edges.steepness_px
     course.mean = edges.mean
+    course.cut = edges.cut
     course.across = profiles.across
 
 
