@@ -24,6 +24,7 @@ from cosmic.vico.core.vision import checks
 from cosmic.vico.core.vision.axial import NAMES, Joints
 from cosmic.vico.core.vision.certainty import CERTAIN, WEIGHTS, Signs, probability
 from cosmic.vico.core.vision.certainty import NAMES as SIGNS
+from cosmic.vico.core.vision.profiles import Profiles, find_edges
 from unit.vico.vision.drawn_fibres import arc, drawn_image, strip
 
 PAIRS = (Kind.TOUCHING, Kind.OVERLAPPING, Kind.GAP)
@@ -206,3 +207,25 @@ def test_what_is_learnt_is_the_same_again_and_is_never_what_is_checked() -> None
         np.testing.assert_array_equal(
             one.signs.weighed_by(WEIGHTS), other.signs.weighed_by(WEIGHTS)
         )
+
+
+@pytest.mark.parametrize("degrees", [20, 26, 32, 38])
+def test_a_fibre_that_another_one_crosses_obliquely_is_not_longer_for_it(degrees: int) -> None:
+    lean = float(np.radians(degrees))
+    first = arc((100.0, 240.0), 0.0, 420.0, 0.0)
+    start = (310.0 - 170.0 * np.cos(lean), 240.0 - 170.0 * np.sin(lean))
+    second = arc(start, lean, 340.0, 0.0)
+    found = find_fibres(drawn_image([first, second], [9.0, 12.0], noise=2.0))
+    for fibre, length in zip(found, (420.0, 340.0), strict=True):
+        low, high = fibre.length_interval_px
+        assert low <= length <= high
+
+
+def test_an_edge_that_is_covered_before_the_section_falls_is_not_seen() -> None:
+    across = np.arange(-40.0, 41.0, dtype=np.float32)
+    height = np.tile(np.exp(-0.5 * (across / 12.0) ** 2), (60, 1)).astype(np.float32)
+    flat = np.zeros(60)
+    for reach, cut in ((40.0, False), (12.0, True)):
+        clear = np.tile(np.abs(across) <= reach, (60, 1))
+        seen = Profiles(across, height, clear, 0.0, np.zeros((60, 2)), flat, flat)
+        assert find_edges(seen, height * clear, np.ones(60, np.bool_), 28.0).cut is cut

@@ -46,3 +46,43 @@ def test_the_shade_of_what_crosses_a_fibre_is_no_sign_of_two() -> None:
     shaded = image + 14.0 * cv2.GaussianBlur(near * fibre, (0, 0), 1.0) * (image < 125)
     found = find_fibres(np.clip(shaded, 0, 255).astype(np.uint8))
     assert [fibre.certain for fibre in found] == [True, True]
+
+
+@pytest.mark.parametrize(
+    ("lines", "true"),
+    [
+        # They touch on the right, and no ground is seen between them there.
+        (
+            [
+                arc((100.0, 150.0), 0.055, 360.0, 0.0),
+                arc((80.0, 172.0), 0.02, 440.0, 0.0),
+                arc((120.0, 190.0), 0.02, 330.0, 0.0),
+            ],
+            [440.0, 360.0, 330.0],
+        ),
+        # Two cross at four degrees, and come out of each other's shade.
+        ([arc((90.0, 170.0), 0.09, 400.0, 0.0), arc((90.0, 190.0), 0.02, 460.0, 0.0)], [460, 400]),
+    ],
+)
+def test_fibres_of_a_bundle_that_touch_or_cross_are_separated(
+    lines: list[np.ndarray], true: list[float]
+) -> None:
+    found = find_fibres(drawn_image(lines, [9.0] * len(lines), shape=(480, 1280)))
+    assert lengths(found) == pytest.approx(true, rel=0.005)
+    assert [fibre.width_px for fibre in found] == pytest.approx([9.0] * len(lines), abs=0.9)
+    assert all(any("bundle" in doubt for doubt in fibre.doubts) for fibre in found)
+
+
+def test_an_end_that_lies_on_another_fibre_of_a_bundle_is_not_made_up() -> None:
+    lines = [arc((100.0, 180.0), 0.0, 420.0, 0.0), arc((120.0, 194.0), -0.0466, 300.0, 0.0)]
+    found = find_fibres(drawn_image(lines, [9.0, 9.0], shape=(480, 1280)))
+    apart = [each for each in found if any("bundle" in doubt for doubt in each.doubts)]
+    assert not any(fibre.certain for fibre in found)
+    assert len(apart) != 2 or lengths(apart) == pytest.approx([420.0, 300.0], rel=0.01)
+
+
+def test_a_hollow_fibre_is_not_taken_for_two_that_touch() -> None:
+    line = arc((80.0, 150.0), 0.1, 460.0, 0.3)
+    found = find_fibres(drawn_image([line], [24.0], lumen=0.8))
+    assert [fibre.certain for fibre in found] == [True]
+    assert lengths(found) == pytest.approx([460.0], rel=0.001)

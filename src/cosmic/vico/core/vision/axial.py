@@ -22,9 +22,9 @@ from scipy.ndimage import (
     uniform_filter1d,
 )
 
-from cosmic.frame.arrays import Floats, Floats32
+from cosmic.frame.arrays import Floats, Floats32, Mask
 from cosmic.vico.core.vision.grey import middle, middles
-from cosmic.vico.core.vision.profiles import Flags, Scene, sample
+from cosmic.vico.core.vision.profiles import Scene, sample
 from cosmic.vico.core.vision.refine import STEP_PX, Course
 from cosmic.vico.core.vision.smoothing import (
     arc_lengths,
@@ -165,7 +165,7 @@ def joints(scene: Scene, course: Course) -> Joints:
     return _joints([*signs, *(part * each for each in others), *abrupt], course.width, breaks)
 
 
-def _breaks(dip: Floats, clear: Flags) -> Floats:
+def _breaks(dip: Floats, clear: Mask) -> Floats:
     """Return the deepest point of each place at which a fibre is broken."""
     labels, count = label(clear & (dip > BREAK))
     at = maximum_position(dip, labels, range(1, count + 1)) if count else []
@@ -180,7 +180,7 @@ def _joints(signs: Sequence[Floats], width: float, breaks_px: Floats) -> Joints:
     return Joints(clearest, np.array(near), breaks_px=breaks_px)
 
 
-def _seen(course: Course, flags: Flags, line: Floats, blur: float) -> Flags:
+def _seen(course: Course, flags: Mask, line: Floats, blur: float) -> Mask:
     """Return the points with a flag all around, away from the ends."""
     s, at = arc_lengths(course.line), arc_lengths(line)
     good = np.interp(at, s, flags.astype(float)) > 0.99
@@ -190,7 +190,7 @@ def _seen(course: Course, flags: Flags, line: Floats, blur: float) -> Flags:
     return np.asarray(good, dtype=np.bool_)
 
 
-def unshaded(course: Course) -> Flags:
+def unshaded(course: Course) -> Mask:
     """Return the points of a course with nothing that crosses it, or shades it, beside them."""
     size = 2 * int(SHADE * course.width / STEP_PX) + 1
     return np.asarray(minimum_filter1d(course.free.astype(np.uint8), size, mode="nearest") > 0)
@@ -221,7 +221,7 @@ def _uneven(values: Floats, blur: float, window: int) -> Floats:
 def _notch(
     height: Floats32,
     across: Floats32,
-    where: tuple[Flags, Flags],
+    where: tuple[Mask, Mask],
     width: float,
     blur: float,
     side: float,
@@ -234,7 +234,7 @@ def _notch(
 
 
 def _abrupt(
-    height: Floats32, across: Floats32, where: tuple[Flags, float], width: float, blur: float
+    height: Floats32, across: Floats32, where: tuple[Mask, float], width: float, blur: float
 ) -> list[Floats]:
     """Return how clearly the edges, and what lies between them, step within a width.
 
@@ -272,7 +272,7 @@ def _abrupt(
     return [np.stack([none[0], np.hypot(left, right)]), np.stack([none[0], middle_part])]
 
 
-def _kinked(line: Floats, aside_px: Floats, seen: Flags, width: float, blur: float) -> Floats:
+def _kinked(line: Floats, aside_px: Floats, seen: Mask, width: float, blur: float) -> Floats:
     """Return how far the course turns more within a width than before and after.
 
     The line itself is smooth; where its fibre lies off it the middle of the grey levels says.
@@ -298,7 +298,7 @@ def _kinked(line: Floats, aside_px: Floats, seen: Flags, width: float, blur: flo
     return _beyond(values, whole, whole, TURN)
 
 
-def _beyond(values: Floats, seen: Flags, where: Flags, least: float) -> Floats:
+def _beyond(values: Floats, seen: Mask, where: Mask, least: float) -> Floats:
     """Return how far something stands out at each point from a fibre's own unevenness."""
     return np.where(where | seen, values / _limits(values[seen], least), 0.0)
 
@@ -314,7 +314,7 @@ def _limits(values: Floats, least: float) -> Floats:
     return np.array([[max(least, own)], [max(WITH_OTHERS * least, own)]])
 
 
-def _stepped(values: Floats, seen: Flags, width: float, blur: float, least: float) -> Floats:
+def _stepped(values: Floats, seen: Mask, width: float, blur: float, least: float) -> Floats:
     """Return how far the mean of a stretch differs from that of the next one, at each point."""
     size = max(6, int(1.5 * width))
     apart = int(np.ceil(0.5 * size + 1.5 * blur))

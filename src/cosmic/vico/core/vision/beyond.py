@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
-from cosmic.frame.arrays import ByteMask, Floats
+from cosmic.frame.arrays import ByteMask, Floats, Mask
 from cosmic.vico.core.vision.ends import EndKind, bent, leaving
 from cosmic.vico.core.vision.grey import middle
-from cosmic.vico.core.vision.profiles import Flags, Scene, sample, within
+from cosmic.vico.core.vision.profiles import Scene, sample, within
 from cosmic.vico.core.vision.refine import STEP_PX, Course
 from cosmic.vico.core.vision.smoothing import directions
 
@@ -156,7 +156,7 @@ def _rays(scene: Scene, course: Course, at: int, explained: ByteMask) -> float:
     return float(both[ahead].max()) / max(TIMES * spread, SHARE * contrast)
 
 
-def _means(values: Floats, free: Flags) -> Floats:
+def _means(values: Floats, free: Mask) -> Floats:
     """Return the mean of each ray as far as it is free; NaN where less than half is."""
     count = free.sum(axis=0)
     total = np.where(free, values, 0.0).sum(axis=0)
@@ -166,7 +166,7 @@ def _means(values: Floats, free: Flags) -> Floats:
     return np.asarray((padded[:-2] + padded[1:-1] + padded[2:]) / 3.0)
 
 
-def _above(mean: Floats, known: Flags) -> Floats:
+def _above(mean: Floats, known: Mask) -> Floats:
     """Return how far rays lie above those around them, light that falls off taken away."""
     filled = np.where(known, mean, middle(mean[known]))
     order = np.flatnonzero(known)

@@ -79,7 +79,7 @@ def doubts_of(course: Course, step: float) -> list[str]:
         (fades(course, typical), FADES),
         (dirty_end(course), DIRTY_END),
         (width_spread(course) > LIMITS.width_spread or bumpy(course), UNEVEN),
-        (float(seen.mean()) < LIMITS.seen, UNSEEN),
+        (float(seen.mean()) < LIMITS.seen or course.cut, UNSEEN),
         (hidden_px > max(30.0, LIMITS.gap_widths * course.width), HIDDEN_STRETCH),
         (sharpest_turn(course) > LIMITS.turn, SHARP),
     )

@@ -5,9 +5,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from cosmic.frame.arrays import Floats
+from cosmic.frame.arrays import Floats, Mask
 from cosmic.vico.core.vision.grey import middle
-from cosmic.vico.core.vision.profiles import Flags, Scene, sample, within
+from cosmic.vico.core.vision.profiles import Scene, sample, within
 from cosmic.vico.core.vision.smoothing import directions, softened
 
 # Grey levels: below, there is nothing of which a half could be told.
@@ -64,7 +64,7 @@ def find_end(scene: Scene, line: Floats, level: Level) -> End:
     lateral = np.linspace(-half, half, max(3, 2 * round(half) + 1))
     axis = bent(line, outward, along)
     x, y = ((axis[:, n, None] + lateral[None, :] * normal[n]).astype(np.float32) for n in (0, 1))
-    inside: Flags = np.all(within(scene, x, y), axis=1)
+    inside: Mask = np.all(within(scene, x, y), axis=1)
     values = scene.sign * (sample(scene.image, x, y) - level.ground)
     mean = values.mean(axis=1, dtype=np.float64)
     blur = max(1.0, min(4.0, 12.0 * level.noise / max(level.contrast, 1e-6) / np.sqrt(half)))
@@ -96,7 +96,7 @@ def bent(line: Floats, outward: Floats, along: Floats) -> Floats:
     return np.asarray(inner + np.maximum(along, 0.0)[:, None] * outward[None, :])
 
 
-def crossing(along: Floats, mean: Floats, inside: Flags, height: float, level: Level) -> End:
+def crossing(along: Floats, mean: Floats, inside: Mask, height: float, level: Level) -> End:
     """Return the first point that stays below half of the height."""
     if not height > max(0.4 * level.contrast, LEAST_HEIGHT):
         return End(EndKind.LOST, 0.0, level.width)

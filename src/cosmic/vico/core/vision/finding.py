@@ -150,6 +150,7 @@ def slender(course: Course, least: float) -> bool:
 
 def section_of(scene: Scene, course: Course) -> Section:
     """Return the cross section of a fibre; one that is no bar is as wide as half of its height."""
+    scene = course.alone or scene
     reach = 0.5 * course.width + 3.0 * min(course.blur_px, 0.4 * course.width) + 3.0
     good = course.good & ~near_ends(course)
     good = good if good.sum() >= FEWEST_ROWS else course.good

@@ -7,11 +7,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.frame.arrays import ByteMask, Floats, Floats32
+from cosmic.frame.arrays import ByteMask, Floats, Floats32, Mask
 from cosmic.vico.core.vision.grey import middle
 from cosmic.vico.core.vision.smoothing import arc_lengths
-
-Flags = npt.NDArray[np.bool_]
 
 FIRST, SECOND, BOTH = 1, 2, 3
 
@@ -170,7 +168,7 @@ def build_graph(mask: ByteMask, most: int) -> Graph | None:
     return Graph(branches, nodes, np.asarray(half_widths, dtype=np.float32))
 
 
-def centres(forks: Flags, labels: npt.NDArray[np.int32]) -> list[Floats]:
+def centres(forks: Mask, labels: npt.NDArray[np.int32]) -> list[Floats]:
     """Return the middle of each fork, x and y, by its label from 1 on."""
     rows, columns = np.nonzero(forks)
     of = labels[rows, columns]
@@ -179,7 +177,7 @@ def centres(forks: Flags, labels: npt.NDArray[np.int32]) -> list[Floats]:
     return list(np.column_stack([x, y]))
 
 
-def paths(pieces: Flags) -> list[list[tuple[int, int]]]:
+def paths(pieces: Mask) -> list[list[tuple[int, int]]]:
     """Return the pixels (row, column) of each piece in order."""
     rows, columns = np.nonzero(pieces)
     left = set(zip(rows.tolist(), columns.tolist(), strict=True))

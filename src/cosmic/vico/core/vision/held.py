@@ -10,11 +10,10 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from cosmic.frame.arrays import Floats
+from cosmic.frame.arrays import Floats, Mask
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.vico.core.vision import axial, beyond, certainty, checks
 from cosmic.vico.core.vision.ends import EndKind
-from cosmic.vico.core.vision.profiles import Flags
 from cosmic.vico.core.vision.smoothing import arc_lengths, resampled
 from cosmic.vico.core.vision.tool_types import GripperTips
 
@@ -165,7 +164,7 @@ def _cut(line: Floats, gripper: GripperTips, width: float) -> tuple[Floats, Clam
     return _leaving(out, s, used, hold, forward)
 
 
-def _coming_out(line: Floats, ahead: Floats, beside: Flags, near: float) -> Floats:
+def _coming_out(line: Floats, ahead: Floats, beside: Mask, near: float) -> Floats:
     """Return the part of a line that is ahead of the front, from there on."""
     crosses = ((ahead[:-1] <= 0) != (ahead[1:] <= 0)) & beside[:-1]
     crossings = np.flatnonzero(crosses)
@@ -181,7 +180,7 @@ def _coming_out(line: Floats, ahead: Floats, beside: Flags, near: float) -> Floa
 
 
 def _leaving(
-    out: Floats, s: Floats, used: Flags, hold: Floats, forward: Floats
+    out: Floats, s: Floats, used: Mask, hold: Floats, forward: Floats
 ) -> tuple[Floats, Clamp]:
     """Return a line that begins at the front, found by a parabola through what is near it."""
     side = np.array([-forward[1], forward[0]])

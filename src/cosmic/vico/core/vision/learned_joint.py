@@ -17,10 +17,10 @@ from typing import Final
 
 import numpy as np
 
-from cosmic.frame.arrays import Floats, Floats32
+from cosmic.frame.arrays import Floats, Floats32, Mask
 from cosmic.vico.core.vision.axial import LEAST_WIDTH_PX, unshaded
 from cosmic.vico.core.vision.grey import middle
-from cosmic.vico.core.vision.profiles import Flags, Scene, sample
+from cosmic.vico.core.vision.profiles import Scene, sample
 from cosmic.vico.core.vision.refine import Course
 from cosmic.vico.core.vision.smoothing import arc_lengths, directions
 
@@ -65,7 +65,7 @@ class Strip:
     """
 
     levels: Floats32
-    where: Flags
+    where: Mask
     facts: Floats32
 
 
@@ -166,7 +166,7 @@ def logits(strip: Strip, weights: Mapping[str, Floats32]) -> Floats32:
 
 
 def _answers(
-    levels: Floats32, where: Flags, facts: Floats32, weights: Mapping[str, Floats32]
+    levels: Floats32, where: Mask, facts: Floats32, weights: Mapping[str, Floats32]
 ) -> Floats32:
     """Return the network's answers to strips of one length, shape (strips, n / STRIDE)."""
     near = _convolved(levels, weights, "first", stride=STRIDE)

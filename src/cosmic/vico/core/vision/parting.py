@@ -3,25 +3,27 @@
 The reduced image joins what lies less than one of its pixels apart. Where the ground shows across
 a strand it is cut. Where a strand is wider than one fibre, or reads in two ways, the image is
 looked at again at full size; what is found there counts where each has two ends, so that nothing is
-guessed. Else the strand stays what it was, and its doubts say so.
+guessed. What touches is drawn, as `bundles` says. Else the strand stays what it was, and its doubts
+say so.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, repeat
 from typing import Final
 
 import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cosmic.frame.arrays import ByteMask, Floats
-from cosmic.vico.core.vision import axial, checks
+from cosmic.frame.arrays import ByteMask, Floats, Mask
+from cosmic.vico.core.vision import axial, bundles, checks
+from cosmic.vico.core.vision.bundle_strip import whole
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.graph import build_graph, prune
 from cosmic.vico.core.vision.joining import AMBIGUOUS, FOLDED, Strand, strands
 from cosmic.vico.core.vision.profiles import Scene
-from cosmic.vico.core.vision.refine import Course, neighbours_of, refine
+from cosmic.vico.core.vision.refine import STEP_PX, Course, Neighbours, lying, neighbours_of, refine
 from cosmic.vico.core.vision.relief import hats, stands_out, threshold
 from cosmic.vico.core.vision.smoothing import arc_lengths
 
@@ -38,6 +40,9 @@ MOST_PARTS: Final = 8
 MOST_STRANDS: Final = 24
 MOST_SUSPECTS: Final = 4
 """So many of so many strands of an image are looked at again, for the sake of time."""
+OWN_SPREAD: Final = 0.1
+"""Of a width: one that varies by more may be that of several fibres."""
+STRAY_WIDTHS: Final = 0.5
 SLENDER: Final = 5.0
 MARGIN_PX: Final = 16
 MOSTLY: Final = 0.7
@@ -105,6 +110,7 @@ def separated(
         return kept, found
     gone: set[int] = set()
     fresh: list[tuple[Strand, Course | None]] = []
+    tried: list[Mask] = []
     suspects = [
         (index, strand)
         for index, (strand, course) in enumerate(zip(kept, found, strict=True))
@@ -113,7 +119,7 @@ def separated(
     for index, strand in suspects[:MOST_SUSPECTS]:
         if index in gone:
             continue
-        separated = _separated(scene, strand, least)
+        separated = _separated(scene, strand, least, tried)
         fresh += separated
         parts = [part for part, _ in separated]
         gone |= {n for n, each in enumerate(kept) if parts and _covered(each, parts, ON)}
@@ -123,7 +129,9 @@ def separated(
     return [strand for strand, _ in both], [course for _, course in both]
 
 
-def _separated(scene: Scene, strand: Strand, least: float) -> list[tuple[Strand, Course | None]]:
+def _separated(
+    scene: Scene, strand: Strand, least: float, tried: list[Mask]
+) -> list[tuple[Strand, Course | None]]:
     """Return the fibres of a bundle, none where they cannot be told apart."""
     for depth in DEPTHS:
         parts = _parts(scene, strand, least, depth)
@@ -132,14 +140,48 @@ def _separated(scene: Scene, strand: Strand, least: float) -> list[tuple[Strand,
         courses = [
             refine(scene, each, neighbours_of(scene, parts, n)) for n, each in enumerate(parts)
         ]
-        if _separate(courses, least):
+        if _separate(courses, least) and all(map(_held, repeat(scene), parts, courses)):
             return list(zip(parts, courses, strict=True))
-    return []
+    return _drawn_apart(scene, strand, least, tried)
+
+
+def _drawn_apart(
+    scene: Scene, strand: Strand, least: float, tried: list[Mask]
+) -> list[tuple[Strand, Course | None]]:
+    """Return the fibres of a bundle that touch, none where drawing them does not tell them apart.
+
+    Each is looked at without what the others look like. What was tried is added to `tried`.
+    """
+    own = whole(scene, strand)
+    if any(np.array_equal(own, each) for each in tried):
+        return []
+    tried.append(own)
+    bars = bundles.separated_bars(scene, own)
+    if len(bars) < 2:
+        return []
+    parts = [
+        Strand(scene.reduced(each.line), (0.5 * each.width + 0.25) / scene.factor, doubts=[BUNDLED])
+        for each in bars
+    ]
+    courses = [
+        lying(one, bar.line, bar.width, bar.blur_px, _on_it(bars, number))
+        for number, (one, bar) in enumerate(zip(bundles.alone(scene, bars), bars, strict=True))
+    ]
+    return list(zip(parts, courses, strict=True)) if _separate(courses, least) else []
+
+
+def _on_it(bars: list[bundles.Bar], number: int) -> Neighbours:
+    """Return the other fibres of a bundle, as far as they lie on one: there it is not seen."""
+    others = [each for n, each in enumerate(bars) if n != number]
+    margins = [np.full(len(each.line), 0.5 * each.width - 2.0) for each in others]
+    return Neighbours(
+        cKDTree(np.concatenate([each.line for each in others])), np.concatenate(margins)
+    )
 
 
 def _suspect(strand: Strand, course: Course) -> bool:
     doubted = AMBIGUOUS in strand.doubts or FOLDED in strand.doubts
-    wide = checks.parted(course) or checks.width_spread(course) > checks.LIMITS.width_spread
+    wide = checks.parted(course) or checks.width_spread(course) > OWN_SPREAD
     return not strand.closed and (doubted or wide)
 
 
@@ -189,6 +231,15 @@ def _separate(courses: Sequence[Course | None], least: float) -> bool:
         and not checks.parted(course)
         for course in courses
     )
+
+
+def _held(scene: Scene, strand: Strand, course: Course | None) -> bool:
+    """Return whether a course is seen on most of its length and lies where the strand does."""
+    if course is None or float(course.good.mean()) < checks.LIMITS.seen:
+        return False
+    room = int(np.ceil(STRAY_WIDTHS * course.width / STEP_PX))
+    away, _ = cKDTree(scene.full(strand.points)).query(course.line[room:-room])
+    return bool((away < STRAY_WIDTHS * course.width).all())
 
 
 def _length(scene: Scene, strand: Strand) -> float:

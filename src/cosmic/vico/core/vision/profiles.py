@@ -5,16 +5,13 @@ from typing import Final
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from cosmic.frame.arrays import Floats, Floats32
+from cosmic.frame.arrays import Floats, Floats32, Mask
 from cosmic.vico.core.vision.grey import middle, middles
 from cosmic.vico.core.vision.smoothing import directions, softened
 
 AT_ONCE: Final = 32000
 """OpenCV takes grey levels at fewer than 32767 rows or columns of points at once."""
-
-Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +34,7 @@ class Profiles:
 
     across: Floats32
     height: Floats32
-    clear: Flags
+    clear: Mask
     noise: float
     normals: Floats
     ground: Floats
@@ -56,6 +53,8 @@ class Edges:
         Height of each cross section.
     mean : ndarray, shape (m,)
         The typical cross section, 1 at its highest.
+    cut : bool
+        Whether it has not fallen to half of its height where other things cover what is beside it.
     """
 
     left: Floats
@@ -63,6 +62,7 @@ class Edges:
     contrast: Floats
     mean: Floats
     steepness_px: float
+    cut: bool = False
 
 
 def sample(image: Floats32, x: Floats32, y: Floats32) -> Floats32:
@@ -76,7 +76,7 @@ def sample(image: Floats32, x: Floats32, y: Floats32) -> Floats32:
     return np.asarray(found, dtype=np.float32)
 
 
-def within(scene: "Scene", x: Floats32, y: Floats32) -> Flags:
+def within(scene: "Scene", x: Floats32, y: Floats32) -> Mask:
     """Return which points lie on the image."""
     right, bottom = scene.corner + 0.5
     return np.asarray((x >= -0.5) & (x <= right) & (y >= -0.5) & (y <= bottom))
@@ -156,7 +156,7 @@ def cross_sections(
     )
 
 
-def ground_of(values: Floats32, free: Flags, across: Floats32) -> tuple[Floats32, Floats, float]:
+def ground_of(values: Floats32, free: Mask, across: Floats32) -> tuple[Floats32, Floats, float]:
     """Return the ground under each cross section, sloping from side to side, and its noise."""
     raw = np.empty((4, len(values)))
     for number, side in enumerate((across < 0, across > 0)):
@@ -205,7 +205,7 @@ def box_centres(profiles: Profiles, height: Floats32, width: float, reach: float
     return np.asarray(middles[best])
 
 
-def typical_section(height: Floats32, good: Flags) -> Floats:
+def typical_section(height: Floats32, good: Mask) -> Floats:
     """Return the median cross section, 1 at its highest."""
     rows = height[good] if good.any() else height
     rows = rows[:: len(rows) // 100 + 1]
@@ -225,7 +225,7 @@ def level_crossing(mean: Floats, across: Floats32, level: float, side: int) -> f
     return float("nan")
 
 
-def find_edges(profiles: Profiles, height: Floats32, good: Flags, width: float) -> Edges:
+def find_edges(profiles: Profiles, height: Floats32, good: Mask, width: float) -> Edges:
     """Return the outer edges of each cross section at half of its height."""
     across = profiles.across
     near = np.abs(across) < 0.8 * width + 3.0
@@ -242,7 +242,19 @@ def find_edges(profiles: Profiles, height: Floats32, good: Flags, width: float) 
     inner = [level_crossing(mean, across, 0.75, side) for side in (-1, 1)]
     outer = [level_crossing(mean, across, 0.25, side) for side in (-1, 1)]
     steep = float(np.nanmean(np.abs(np.subtract(outer, inner)))) if np.isfinite(inner).any() else 0
-    return Edges(found[0], found[1], contrast, mean, steep / 1.349)
+    cut = any(
+        _is_cut(profiles, good, point, side) for point, side in zip(expected, (-1, 1), strict=True)
+    )
+    return Edges(found[0], found[1], contrast, mean, steep / 1.349, cut)
+
+
+def _is_cut(profiles: Profiles, good: Mask, point: float, side: int) -> bool:
+    """Return whether what lies right beyond an edge is covered on most of the length."""
+    beyond = np.flatnonzero(side * (profiles.across - point) > 0.0)
+    if not len(beyond) or not good.any():
+        return False
+    column = profiles.clear[good, beyond[0] if side > 0 else beyond[-1]]
+    return float(column.mean()) < 0.5
 
 
 def edge_near(

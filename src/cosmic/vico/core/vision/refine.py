@@ -5,13 +5,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cosmic.frame.arrays import Floats, Floats32
+from cosmic.frame.arrays import Floats, Floats32, Mask
 from cosmic.vico.core.vision.ends import End, EndKind, Level, find_end
 from cosmic.vico.core.vision.grey import middle
 from cosmic.vico.core.vision.joining import Strand
 from cosmic.vico.core.vision.profiles import (
     Edges,
-    Flags,
     Profiles,
     Scene,
     along,
@@ -25,6 +24,11 @@ STEP_PX = 2.0
 # So far beyond the border a line may be smoothed.
 STRAY_PX = 30.0
 ROUNDS = 2
+# So far apart, in pixels of the reduced image, the points of a strand are not beside each other.
+GAP = 2.0
+# Of an end that was drawn: how far off it may be, and over which length it falls, by its blur.
+DRAWN_END_PX = 0.3
+SOFT_OF_BLUR = 1.68
 
 
 @dataclass(slots=True, eq=False)
@@ -39,13 +43,17 @@ class Course:
         Where both edges were seen.
     free : ndarray of bool, shape (n,)
         Where nothing else known covers the cross section.
+    cut : bool
+        Its edges are not seen: other things cover what is beside it before it has fallen.
+    alone : Scene or None
+        Of a fibre of a bundle: the image without the others.
     widths : ndarray, shape (n,)
         NaN where they were not.
     """
 
     line: Floats
     width: float
-    good: Flags
+    good: Mask
     widths: Floats
     contrast: Floats
     ends: list[End]
@@ -56,7 +64,9 @@ class Course:
     mean: Floats = field(default_factory=lambda: np.zeros(0))
     ground: Floats = field(default_factory=lambda: np.zeros(0))
     tilt: Floats = field(default_factory=lambda: np.zeros(0))
-    free: Flags = field(default_factory=lambda: np.zeros(0, bool))
+    free: Mask = field(default_factory=lambda: np.zeros(0, bool))
+    cut: bool = False
+    alone: Scene | None = None
 
     @property
     def edge_blur_px(self) -> float:
@@ -71,7 +81,7 @@ class Neighbours:
     tree: cKDTree | None
     margins: Floats
 
-    def near(self, line: Floats, width: float) -> Flags:
+    def near(self, line: Floats, width: float) -> Mask:
         """Return which points lie where another strand covers part of the cross section."""
         if self.tree is None:
             return np.zeros(len(line), bool)
@@ -86,9 +96,10 @@ def neighbours_of(scene: Scene, kept: list[Strand], index: int) -> Neighbours:
     low, high = own.min(axis=0) - reach, own.max(axis=0) + reach
     others = []
     for n, each in enumerate(kept):
-        inside = ((each.points > low) & (each.points < high)).all(axis=1)
+        points = without_gaps(each.points)
+        inside = ((points > low) & (points < high)).all(axis=1)
         if n != index and inside.any():
-            others.append((each, scene.full(each.points[inside])))
+            others.append((each, scene.full(points[inside])))
     if not others:
         return Neighbours(None, np.zeros(0))
     points = np.concatenate([line for _, line in others])
@@ -96,6 +107,18 @@ def neighbours_of(scene: Scene, kept: list[Strand], index: int) -> Neighbours:
         [np.full(len(line), each.half_width * scene.factor) for each, line in others]
     )
     return Neighbours(cKDTree(points), margins)
+
+
+def without_gaps(points: Floats) -> Floats:
+    """Return the points of a strand and, where it goes through a crossing, those between.
+
+    Without them what it covers there would be taken for free.
+    """
+    s = arc_lengths(points)
+    if len(points) < 2 or not np.diff(s).max() > GAP:
+        return points
+    at = np.linspace(0.0, float(s[-1]), int(np.ceil(s[-1])) + 1)
+    return np.column_stack([np.interp(at, s, points[:, axis]) for axis in (0, 1)])
 
 
 def refine(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | None:
@@ -126,6 +149,27 @@ def _refined(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | N
     return course if measure(scene, course, neighbours) else None
 
 
+def lying(
+    scene: Scene, line: Floats, width: float, blur_px: float, neighbours: Neighbours
+) -> Course | None:
+    """Return the course of a fibre of which it is known where it lies; `scene` has it alone."""
+    line = resampled(line, STEP_PX)
+    if len(line) < 6:
+        return None
+    course = Course(
+        line, width, np.ones(len(line), bool), np.full(len(line), width), np.ones(len(line)), []
+    )
+    course.blur_px, course.alone = blur_px, scene
+    course.ends = [End(EndKind.FREE, 0.0, DRAWN_END_PX, SOFT_OF_BLUR * blur_px)] * 2
+    try:
+        seen = measure(scene, course, neighbours)
+    except UndeterminedError:
+        return None
+    # Where it is not seen a line that follows what is seen goes astray.
+    course.line = line
+    return course if seen else None
+
+
 def first_line(scene: Scene, strand: Strand, wave_px: float) -> Floats:
     """Return the way of a strand, smooth, and through its crossings as its sides lead."""
     points = scene.full(strand.points)
@@ -142,7 +186,7 @@ def first_line(scene: Scene, strand: Strand, wave_px: float) -> Floats:
     return resampled(line, STEP_PX) if is_on_image(scene, line, width) else line[:0]
 
 
-def excluded(course: Course, neighbours: Neighbours) -> Flags:
+def excluded(course: Course, neighbours: Neighbours) -> Mask:
     """Return the points whose cross section another strand, or another part, covers."""
     near = neighbours.near(course.line, course.width)
     apart = int(2.5 * course.width / STEP_PX) + 3
@@ -224,7 +268,7 @@ def is_on_image(scene: Scene, line: Floats, width: float) -> bool:
     return bool((line > -room).all() and (line < scene.corner + room).all())
 
 
-def near_ends(course: Course) -> Flags:
+def near_ends(course: Course) -> Mask:
     """Return the points so near to an end that the end's blur reaches them."""
     near = np.zeros(len(course.line), bool)
     if not course.ends:
@@ -234,7 +278,7 @@ def near_ends(course: Course) -> Flags:
     return near
 
 
-def take(course: Course, edges: Edges, widths: Floats, good: Flags, profiles: Profiles) -> None:
+def take(course: Course, edges: Edges, widths: Floats, good: Mask, profiles: Profiles) -> None:
     """Keep what the cross sections say."""
     typical = middle(widths[good])
     course.width = typical
@@ -246,6 +290,7 @@ def take(course: Course, edges: Edges, widths: Floats, good: Flags, profiles: Pr
     course.tilt = profiles.tilt
     course.blur_px = edges.steepness_px
     course.mean = edges.mean
+    course.cut = edges.cut
     course.across = profiles.across
 
 

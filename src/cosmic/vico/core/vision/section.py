@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import erf
 
-from cosmic.frame.arrays import Floats, Floats32
+from cosmic.frame.arrays import Floats, Floats32, Mask
 from cosmic.vico.core.vision.grey import middle
-from cosmic.vico.core.vision.profiles import Flags, Scene
+from cosmic.vico.core.vision.profiles import Scene
 from cosmic.vico.core.vision.smoothing import directions
 
 BIN_PX: Final = 0.5
@@ -91,7 +91,7 @@ class Samples:
     std: Floats
 
 
-def gathered(scene: Scene, line: Floats, good: Flags, ground: Floats, reach: float) -> Samples:
+def gathered(scene: Scene, line: Floats, good: Mask, ground: Floats, reach: float) -> Samples:
     """Return the heights of the pixels along a line over their distance from it.
 
     Pixels are taken as they are, each at its own distance: interpolated ones are more blurred.
@@ -141,7 +141,7 @@ def _summed(
     return Samples(point / count.sum(axis=0), typical, 1.25 * scatter / math.sqrt(shape[0]))
 
 
-def _middle(values: Floats, seen: Flags) -> Floats:
+def _middle(values: Floats, seen: Mask) -> Floats:
     """Return the median of each column of what was seen; the rest is NaN."""
     ordered, count = np.sort(values, axis=0), seen.sum(axis=0)
     columns = np.arange(values.shape[1])

@@ -10,10 +10,9 @@ from typing import Final
 import cv2
 import numpy as np
 
-from cosmic.frame.arrays import Floats, Floats32
+from cosmic.frame.arrays import Floats, Floats32, Mask
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.vico.core.vision.focal_stack import FocalStack, vertices
-from cosmic.vico.core.vision.profiles import Flags
 from cosmic.vico.core.vision.smoothing import arc_lengths, resampled
 from cosmic.vico.hw.interface import Pixels
 
@@ -195,7 +194,7 @@ class _Curve:
 
     @staticmethod
     def _fitted(
-        at: Floats, heights: FibreHeights, used: Flags, degree: int
+        at: Floats, heights: FibreHeights, used: Mask, degree: int
     ) -> tuple[Floats, Floats, Floats]:
         """Return coefficients, their covariance, and all residuals in deviations."""
         weight = 1.0 / heights.std_um[used]
