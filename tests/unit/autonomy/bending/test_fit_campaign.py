@@ -244,7 +244,7 @@ def test_a_cause_is_named_where_it_acts(cause: Quality) -> None:
 @pytest.mark.parametrize(
     ("change", "weak_ones"), [({"weak": 1.0}, range(10, 13)), ({"ei_cv": 0.5}, range(3))]
 )
-def test_a_weak_place_is_told_from_a_fibre_that_is_uneven_all_along(
+def test_a_weak_place_is_distinguished_from_a_fibre_that_is_uneven_all_along(
     change: dict[str, float], weak_ones: range
 ) -> None:
     session = Session(dataclasses.replace(WORLD, **change), np.random.default_rng(33))
