@@ -159,6 +159,21 @@ def test_slow_channels_cannot_be_armed_and_are_disarmed_when_they_get_slow() -> 
     assert not rig.guard.armed
 
 
+def test_what_cannot_be_armed_any_more_is_disarmed_when_acquisition_starts_again() -> None:
+    rig, notes = Rig(), list[str]()
+    rig.arm()
+    rig.guard.on_note(lambda _channel, text: notes.append(text))
+    rig.guard.set_rate(0.0)
+
+    def refuse(_limit: Limit) -> None:
+        raise ConfigError("there is no such channel")
+
+    rig.guard.check = refuse
+    rig.guard.set_rate(1000.0)
+    assert not rig.guard.armed
+    assert notes[-1] == "its limit is disarmed: there is no such channel"
+
+
 @pytest.mark.parametrize(
     ("low", "high", "hysteresis"),
     [(1.0, 1.0, 0.0), (2.0, 1.0, 0.0), (math.nan, 1.0, 0.0), (0.0, 1.0, 0.6), (0.0, 1.0, -0.1)],
