@@ -349,14 +349,24 @@ def assess_campaign(
         assessed = _assessed(every, settings, friction=rubs)
     else:
         rubs = settings.friction
+    results = _results(every[: len(fibres)], assessed, settings, verified=verified)
+    common = assessed.common if assessed else common_prior(settings)
+    return CampaignFit(results, alone, scale_of(common, found, verified=verified), rubs)
+
+
+def _results(
+    fibres: Sequence[MeasuredFibre],
+    assessed: Population | None,
+    settings: FitSettings,
+    *,
+    verified: bool,
+) -> tuple[BendingResult, ...]:
+    """Return the results of fibres, checked one by one and by what images say of all of them."""
     each_assessed = iter(assessed.fibres if assessed else ())
-    pairs = [
-        (each, None if each.readings is None else next(each_assessed))
-        for each in every[: len(fibres)]
-    ]
+    pairs = [(each, None if each.readings is None else next(each_assessed)) for each in fibres]
     seen = [{} if one is None else _seen_bent(each, one.posterior) for each, one in pairs]
     jaws = turned_in_jaws([shape for shapes in seen for shape in shapes.values()])
-    results = tuple(
+    return tuple(
         _nothing(each, settings)
         if each.readings is None or one is None
         else _concluded(
@@ -369,8 +379,6 @@ def assess_campaign(
         )
         for (each, one), shapes in zip(pairs, seen, strict=True)
     )
-    common = assessed.common if assessed else common_prior(settings)
-    return CampaignFit(results, alone, scale_of(common, found, verified=verified), rubs)
 
 
 def _unsure(measured: Sequence[MeasuredFibre], jump_part: float) -> list[MeasuredFibre]:
