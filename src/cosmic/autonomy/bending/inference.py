@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import chdtrc, ndtr
 
 from cosmic.autonomy.bending.holds import TWISTED, UNKNOWN_HOLDS, Holds
-from cosmic.autonomy.bending.response import LaidOut, Response
+from cosmic.autonomy.bending.response import Direction, LaidOut, Response
 from cosmic.autonomy.bending.result import COMMON_SOURCES, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.frame.arrays import Floats
@@ -25,11 +25,8 @@ SHALLOWEST_UM, DEEPEST_UM = 1.5, 240.0
 SURE: Final = 0.3
 """Of ln(depth): what is known better than this needs a grid of its own."""
 
-VARIATIONS: Final = np.array([0.0, 0.05, 0.1, 0.17, 0.28, 0.45])
+VARIATIONS: Final = np.array([0.0, 0.05, 0.1, 0.17, 0.28, 0.45, 0.65])
 """How much ln(EI) varies along a fibre, one standard deviation: those that are weighed."""
-
-VARIATION_PRIOR: Final = np.array([0.05, 0.1, 0.2, 0.25, 0.25, 0.15])
-"""Of paper: 10 to 30 % between places 50 to 300 um apart, weak places every 30 to 100 um."""
 
 LOW_TAIL, HIGH_TAIL = 0.025, 0.975
 EXACT: Final = 1e-15
@@ -166,7 +163,7 @@ def readings_of(
     *,
     part: float = 0.0,
     certified: tuple[float, float] | None = None,
-    direction: tuple[float, float] | None = None,
+    direction: Direction | None = None,
     slipped: bool = False,
     holds: Holds = UNKNOWN_HOLDS,
 ) -> Readings:
@@ -178,9 +175,8 @@ def readings_of(
         Of the campaign that was over, 0 to 1: the gain drifts.
     certified : tuple of float, optional
         Of a standard: ln(EI), EI in uN um2, and its standard uncertainty.
-    direction : tuple of float, optional
-        By how much the fibre leaves the jaws in another direction than the image shows, and the
-        standard deviation of that, rad; by the settings if None.
+    direction : Direction, optional
+        In which the fibre leaves the jaws; as the image shows it if None.
     slipped, holds : bool, Holds
         See `Readings`; and how far sections of the campaign are held.
     """
@@ -191,12 +187,16 @@ def readings_of(
     friction = np.array([each.by_friction for each in rows])
     glass = certified is not None
     softer, by_shear, shear = _sheared(response.by_square[span], settings, glass=glass)
+    direction = direction or Direction(0.0, math.radians(settings.direction_std_deg))
     to_common = _to_common(fits, rows, friction, response, by_shear, part)
     own = (*_own(response, span, settings, direction), shear)
     if glass:
         # Glass rubs and shears otherwise than fibres do.
         to_common[:, [FRICTION, SHEAR]] = 0.0
         own = (*own[1:], ("friction", "", friction, 0.0, settings.friction_std))
+    else:
+        # It was found as if all contacts lay where they are told to.
+        to_common[:, CONTACT] += direction.by_contact * response.by_direction[span]
     same = span[:, None] == span[None, :]
     freed = None if glass else _freed(fits, rows, holds)
     if freed is not None:
@@ -374,10 +374,10 @@ def _own(
     response: Response,
     span: np.ndarray,
     settings: FitSettings,
-    direction: tuple[float, float] | None,
+    direction: Direction,
 ) -> tuple[_Own, ...]:
     """Return what is each fibre's own; see `Readings.own`."""
-    turned, turned_std = direction or (0.0, math.radians(settings.direction_std_deg))
+    turned, turned_std = direction.turned_rad, direction.std_rad
     at_um = np.array([each.at_um for each in response.shapes])[span]
     by_scale = response.by_contact[span] * at_um
     return (

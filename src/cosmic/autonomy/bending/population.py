@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from cosmic.autonomy.bending.inference import (
-    VARIATION_PRIOR,
+    VARIATIONS,
     Common,
     Evidence,
     Posterior,
@@ -39,9 +39,23 @@ SPREADS: Final = np.array([0.15, 0.3, 0.45, 0.65, 0.9])
 
 REACH: Final = 2.5
 MIDDLE_PART: Final = 0.8
-ROUNDS: Final = 3
-PRIOR_FIBRES: Final = 3.0
-"""So many fibres weigh as much as what is known of the variation beforehand."""
+ROUNDS: Final = 4
+TAILS: Final = 3.0
+"""Degrees of freedom of Student's distribution that stands for what is known of the instrument
+beforehand: where readings show that it is far from that, they are believed."""
+
+VARIES: Final = 0.2
+VARIES_SPREAD: Final = 0.7
+"""Median of how much the stiffness of a kind of fibres varies along them, and spread of its
+logarithm. Of paper: 10 to 30 % between places 50 to 300 um apart, weak places every 30 to 100 um.
+"""
+
+VARIES_MIDDLES: Final = np.array([0.03, 0.05, 0.08, 0.12, 0.17, 0.24, 0.33, 0.45, 0.6])
+VARIES_APART: Final = np.array([0.25, 0.5, 0.9])
+"""Of ln(variation): kinds of fibres that are weighed, and how unlike fibres of one kind are."""
+
+LEAST_VARIATION: Final = 0.02
+"""What varies less is taken to vary by so much where logarithms are compared."""
 
 MOST_TAUGHT: Final = 60
 """So many fibres teach at most, of all together: what drifts errs alike in those of a day."""
@@ -97,6 +111,23 @@ def depth_weights(settings: FitSettings, depths_um: Floats) -> tuple[Floats, Flo
     return prior / prior.sum(), np.array(weights)
 
 
+def variation_weights() -> tuple[Floats, Floats]:
+    """Return the kinds of fibres there may be: prior of each, and its weights of the variations.
+
+    Shapes (h,) and (h, variations).
+    """
+    logs = np.log(np.maximum(VARIATIONS, LEAST_VARIATION))
+    wide = np.gradient(logs)
+    priors, weights = [], []
+    for middle in np.log(VARIES_MIDDLES):
+        for apart in VARIES_APART:
+            each = wide * np.exp(-0.5 * ((logs - middle) / apart) ** 2)
+            priors.append(math.exp(-0.5 * ((middle - math.log(VARIES)) / VARIES_SPREAD) ** 2))
+            weights.append(each / each.sum())
+    prior = np.array(priors)
+    return prior / prior.sum(), np.array(weights)
+
+
 def assess(
     readings: Sequence[Readings], settings: FitSettings, *, friction: float | None = None
 ) -> Population:
@@ -109,13 +140,17 @@ def assess(
     """
     prior = common_prior(settings, friction=friction)
     known = [prior] * len(readings)
-    spreads = VARIATION_PRIOR / VARIATION_PRIOR.sum()
-    common, assessed = prior, []
+    variations = [_foreseen()] * len(readings)
+    common, believed, assessed = prior, prior, []
     for number in range(ROUNDS):
         evidence = [
             evidence_of(each, of, settings) for each, of in zip(readings, known, strict=True)
         ]
-        weights = _prior_weights(evidence, readings, settings, spreads)
+        depths = _depths(evidence, readings, settings, variations)
+        variations = _variations(evidence, readings, depths)
+        weights = [
+            depth[:, None] * varied for depth, varied in zip(depths, variations, strict=True)
+        ]
         posteriors = [
             posterior_of(each, weight) for each, weight in zip(evidence, weights, strict=True)
         ]
@@ -125,55 +160,95 @@ def assess(
         ]
         if number == ROUNDS - 1:
             break
-        if len(readings) > 1:
-            spreads = _variations(assessed, readings)
-        common, known = _shared(readings, assessed, weights, prior, settings)
+        common, known = _shared(readings, assessed, weights, believed, settings)
+        believed = _less_sure(prior, common)
     return Population(common, tuple(assessed))
+
+
+def _less_sure(prior: Common, found: Common) -> Common:
+    """Return what is known beforehand, less sure where something else was found."""
+    squared = (found.mean - prior.mean) ** 2 / np.diag(prior.covariance)
+    wider = np.sqrt(np.maximum((TAILS + squared) / (TAILS + 1.0), 1.0))
+    return Common(prior.mean, np.asarray(prior.covariance * np.outer(wider, wider)))
 
 
 def _teaches(assessed: Assessed) -> bool:
     return assessed.posterior.probability > LEAST_PROBABILITY
 
 
-def _prior_weights(
+def _foreseen() -> Floats:
+    """Return the weights of the variations of a fibre of which others tell nothing."""
+    prior, of_kind = variation_weights()
+    return np.asarray(prior @ of_kind)
+
+
+def _depths(
     evidence: Sequence[Evidence],
     readings: Sequence[Readings],
     settings: FitSettings,
-    spreads: Floats,
+    variations: Sequence[Floats],
 ) -> list[Floats]:
-    """Return for each fibre the weights of depths and variations that the others speak for."""
-    prior, of_depth = depth_weights(settings, evidence[0].depths_um)
+    """Return for each fibre the weights of depths that the others speak for."""
+    said = [
+        np.exp(each.log_likelihood - each.log_likelihood.max()) @ varied[: each.chi2.shape[1]]
+        for each, varied in zip(evidence, variations, strict=True)
+    ]
+    # A grip that gave way has its own depth now; a standard has it anyhow.
+    alone = [each.slipped or each.certified is not None for each in readings]
+    return _by_others(
+        evidence, readings, said, depth_weights(settings, evidence[0].depths_um), alone
+    )
+
+
+def _variations(
+    evidence: Sequence[Evidence], readings: Sequence[Readings], depths: Sequence[Floats]
+) -> list[Floats]:
+    """Return for each fibre the weights of variations that the others speak for."""
+    said = [
+        depth @ np.exp(each.log_likelihood - each.log_likelihood.max())
+        for each, depth in zip(evidence, depths, strict=True)
+    ]
+    alone = [each.certified is not None for each in readings]
+    return _by_others(evidence, readings, said, variation_weights(), alone)
+
+
+def _by_others(
+    evidence: Sequence[Evidence],
+    readings: Sequence[Readings],
+    said: Sequence[Floats],
+    kinds: tuple[Floats, Floats],
+    alone: Sequence[bool],
+) -> list[Floats]:
+    """Return for each fibre the weights of values that follow from what all others say of them.
+
+    Parameters
+    ----------
+    said : sequence of ndarray
+        How likely each value is by a fibre's readings.
+    kinds : (ndarray, ndarray)
+        Prior of each way the values may be spread, and its weights of the values.
+    alone : sequence of bool
+        What has nothing to do with the others.
+    """
+    prior, weights = kinds
     logs = np.zeros((len(readings), len(prior)))
     for number, (each, read) in enumerate(zip(evidence, readings, strict=True)):
         fits = each.chi2.min() < 4.0 * max(each.freedom, 1) + 10.0
         if read.certified is None and fits and len(readings) > 1:
-            likely = np.exp(each.log_likelihood - each.log_likelihood.max()) @ spreads
-            logs[number] = np.log(of_depth @ likely + 1e-300)
+            logs[number] = np.log(weights @ said[number] + 1e-300)
     logs = logs * _counts(int(np.count_nonzero(logs.any(axis=1))))
     total = logs.sum(axis=0) + np.log(prior)
     found = []
-    for number, read in enumerate(readings):
-        # A grip that gave way has its own depth now; a standard has it anyhow.
-        alone = read.slipped or read.certified is not None
-        left = np.log(prior) if alone else total - logs[number]
-        weight = np.exp(left - left.max())
-        depths = (weight / weight.sum()) @ of_depth
-        found.append(depths[:, None] * spreads[None, :])
+    for own, by_itself in zip(logs, alone, strict=True):
+        left = np.log(prior) if by_itself else total - own
+        kind = np.exp(left - left.max())
+        found.append((kind / kind.sum()) @ weights)
     return found
 
 
 def _counts(fibres: int) -> float:
     """Return as how much of a fibre each of so many counts."""
     return min(1.0, MOST_TAUGHT / max(fibres, 1))
-
-
-def _variations(assessed: Sequence[Assessed], readings: Sequence[Readings]) -> Floats:
-    """Return how often fibres vary by how much."""
-    total = PRIOR_FIBRES * VARIATION_PRIOR / VARIATION_PRIOR.sum()
-    for each, read in zip(assessed, readings, strict=True):
-        if read.certified is None and _teaches(each):
-            total = total + each.posterior.weights.sum(axis=0)
-    return np.asarray(total / total.sum())
 
 
 def _shared(
@@ -237,8 +312,8 @@ def said_alone(read: Readings, settings: FitSettings) -> tuple[Floats, Floats]:
     """
     prior = common_prior(settings)
     evidence = evidence_of(read, prior, settings)
-    spreads = VARIATION_PRIOR / VARIATION_PRIOR.sum()
-    (weight,) = _prior_weights([evidence], [read], settings, spreads)
+    (depth,) = _depths([evidence], [read], settings, [_foreseen()])
+    weight = depth[:, None] * _foreseen()
     posterior = posterior_of(evidence, weight)
     assessed = Assessed(posterior, evidence, prior, settings.friction)
     std = math.inf if read.certified is None else read.certified[1]

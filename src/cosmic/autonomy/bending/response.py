@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,9 @@ from cosmic.frame.arrays import Floats
 CELLS: Final = 48
 TURNED_RAD: Final = 0.01
 MOVED_UM: Final = 2.0
+ROUNDS: Final = 3
+"""Until a direction by touch is found: a curled fibre answers by no straight line."""
+
 BEYOND: Final = 1.5
 LEAST_TOUCHES: Final = 3
 DISAGREE_TIMES: Final = 4.0
@@ -144,6 +147,23 @@ def response_of(shapes: Sequence[NaturalShape], *, depth_um: float) -> Response:
     )
 
 
+class Direction(NamedTuple):
+    """By how much a fibre leaves the jaws in another direction than the image shows.
+
+    Attributes
+    ----------
+    turned_rad, std_rad : float
+        That, and its standard deviation.
+    by_contact : float
+        By how much less it would be for each um that all contacts lie farther out, rad/um: a fibre
+        that is curled is touched elsewhere then.
+    """
+
+    turned_rad: float
+    std_rad: float
+    by_contact: float = 0.0
+
+
 def direction_by_touch(
     shapes: Sequence[NaturalShape],
     hinges_um: Floats,
@@ -151,7 +171,7 @@ def direction_by_touch(
     radius_um: float,
     noise_um: float,
     prior_rad: float,
-) -> tuple[float, float]:
+) -> Direction:
     """Return how the fibre leaves the jaws, beside what the image shows, by where it was touched.
 
     The probe meets the fibre where its natural shape is: a second witness to the image, and a much
@@ -163,23 +183,38 @@ def direction_by_touch(
         Position of the probe's axis at the first contact of each span, growing as it pushes.
     noise_um, prior_rad : float
         How well a first contact repeats, and how well the image shows the direction.
-
-    Returns
-    -------
-    turned_rad, std_rad : float
     """
     if len(shapes) < LEAST_TOUCHES:
-        return 0.0, prior_rad
-    places = np.array([each.at_um for each in shapes])
-    off = hinges_um + np.array([_touch_um(each, radius_um) for each in shapes])
-    apart = places - places.mean()
-    information = float(apart @ apart) / noise_um**2 + prior_rad**-2
-    turned = -float(apart @ (off - off.mean())) / noise_um**2 / information
-    left = off - off.mean() + turned * apart
+        return Direction(0.0, prior_rad)
+    turned, weights = 0.0, np.zeros(len(shapes))
+    information = prior_rad**-2
+    try:
+        for _ in range(ROUNDS):
+            off = _apart(hinges_um + _touches_um(shapes, radius_um, turned))
+            step = _touches_um(shapes, radius_um, turned + TURNED_RAD)
+            weights = _apart(hinges_um + step) - off
+            weights = weights / TURNED_RAD / noise_um**2
+            information = float(weights @ weights) * noise_um**2 + prior_rad**-2
+            turned -= (float(weights @ off) + turned * prior_rad**-2) / information
+            if abs(turned) > DISAGREE_TIMES * prior_rad:
+                return Direction(0.0, abs(turned))
+        left = _apart(hinges_um + _touches_um(shapes, radius_um, turned))
+        moved = [each.moved(ahead_um=MOVED_UM) for each in shapes]
+        farther = _touches_um(moved, radius_um, turned)
+    except BendingError:  # turned so far, or moved, the shape ends before the probe
+        return Direction(0.0, prior_rad)
     excess = max(1.0, float(left @ left) / (len(shapes) - 2) / noise_um**2)
-    if abs(turned) > DISAGREE_TIMES * prior_rad:
-        return 0.0, abs(turned)
-    return turned, min(math.sqrt(excess / information), prior_rad)
+    by_contact = float(weights @ (_apart(hinges_um + farther) - left)) / MOVED_UM / information
+    return Direction(turned, min(math.sqrt(excess / information), prior_rad), -by_contact)
+
+
+def _apart(values: Floats) -> Floats:
+    return np.asarray(values - values.mean())
+
+
+def _touches_um(shapes: Sequence[NaturalShape], radius_um: float, turned_rad: float) -> Floats:
+    """Return where across the jaws the probe stands when it touches shapes that are turned."""
+    return np.array([_touch_um(each.moved(turned_rad=turned_rad), radius_um) for each in shapes])
 
 
 def _touch_um(shape: NaturalShape, radius_um: float) -> float:
