@@ -34,14 +34,13 @@ from cosmic.autonomy.bending.fit import (
     half_width_percent,
     measure_fibre,
 )
-from cosmic.autonomy.bending.plan import SpanLimits, guess_ei, plan_spans
+from cosmic.autonomy.bending.plan import FARTHER, guess_ei, plan_spans
 from cosmic.autonomy.bending.result import BendingError, BendingResult, Quality
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
 
 NAME = "worlds"
 SESSIONS, FIBRES = 20, 16
-LIMITS = SpanLimits()
 STEEPEST_DEG = 40.0
 LEAST_COVER, MOST_COVER = 90.0, 99.0
 OFF_PERCENT, THROWN_PERCENT = 1.0, 15.0
@@ -223,7 +222,7 @@ def measured(session: Session, fibre: Fibre, settings: FitSettings) -> list[Span
     """Return the spans that a procedure would measure, planned as it goes."""
     spans: list[Span] = []
     free, guess = gentle_um(fibre), 5e-11
-    while plan := plan_spans(free, guess, LIMITS, done=spans, settings=settings):
+    while plan := plan_spans(free, guess, FARTHER, done=spans, settings=settings):
         one = [(plan[0].span_um, plan[0].stroke_um)]
         push = pushes(session, fibre, one, first=len(spans))[0]
         spans.append(span_of(push, fibre))

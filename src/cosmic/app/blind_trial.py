@@ -26,7 +26,7 @@ from cosmic.autonomy.bending.fit import (
     half_width_percent,
     measure_fibre,
 )
-from cosmic.autonomy.bending.plan import DRY_EI_N_M2, guess_ei, plan_spans
+from cosmic.autonomy.bending.plan import DRY_EI_N_M2, FARTHER, guess_ei, plan_spans
 from cosmic.autonomy.bending.result import BendingError, BendingResult
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
@@ -209,7 +209,7 @@ class SealedSession:
         spans: list[Span] = []
         guess = DRY_EI_N_M2
         try:
-            while plan := plan_spans(free, guess, done=spans, settings=self.settings):
+            while plan := plan_spans(free, guess, FARTHER, done=spans, settings=self.settings):
                 one = plan[0]
                 read = self._ask({"push": [one.span_um, one.stroke_um]})
                 with self._understood(read):

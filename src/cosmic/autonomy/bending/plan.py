@@ -64,6 +64,11 @@ class SpanLimits(StrictModel):
     strain_percent: float = Field(0.5, gt=0.0)
 
 
+FARTHER: Final = SpanLimits(longest_um=800.0, longest_stroke_um=70.0, shortest_part=0.15)
+"""For fibres of a millimetre and more that are not very soft: the farther out, the less depth and
+compliance of the clamp count."""
+
+
 @dataclass(frozen=True, slots=True)
 class PlannedSpan:
     """One push to be made.

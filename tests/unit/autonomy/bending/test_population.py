@@ -52,7 +52,7 @@ def touched(fibre: Fibre, *, shown_deg: float, farther_um: float) -> tuple[float
 
 @pytest.mark.parametrize("arc_deg", [0.0, 40.0, -70.0])
 @pytest.mark.parametrize("shown_deg", [-2.0, 1.0])
-def test_touches_tell_how_far_an_image_has_turned_a_fibre_also_a_curled_one(
+def test_first_contacts_give_the_direction_of_a_fibre_beside_the_image(
     arc_deg: float, shown_deg: float
 ) -> None:
     fibre = dataclasses.replace(drawn(WORLD, 1, 1)[1][0], turn_deg=arc_deg)
@@ -61,7 +61,7 @@ def test_touches_tell_how_far_an_image_has_turned_a_fibre_also_a_curled_one(
 
 
 @pytest.mark.parametrize("arc_deg", [50.0, -50.0])
-def test_where_the_edge_lies_elsewhere_a_curled_fibre_is_turned_by_as_much_as_is_told(
+def test_a_displaced_edge_turns_a_curled_fibre_by_its_derivative(
     arc_deg: float,
 ) -> None:
     fibre = dataclasses.replace(drawn(WORLD, 1, 1)[1][0], turn_deg=arc_deg)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cosmic.autonomy.bending.plan import SpanLimits
+from cosmic.autonomy.bending.plan import FARTHER, SpanLimits
 from cosmic.autonomy.campaign.recipe import asks_the_same, load_recipe, shipped_recipes
 from cosmic.autonomy.handling.settings import StandardSettings
 from cosmic.autonomy.shipped.registry import PARAMETERS
@@ -35,6 +35,12 @@ def test_a_shipped_recipe_is_found_by_its_name_and_is_right(name: str) -> None:
     assert recipe.file.sample.name
     assert recipe.text.startswith("#")
     assert isinstance(recipe.parameters, Parameters)
+
+
+def test_the_shipped_bend_test_pushes_as_far_out_as_sealed_sessions_do() -> None:
+    found = load_recipe(Path("bend-test"), procedures=PROCEDURES).parameters
+    assert isinstance(found, Parameters)
+    assert found.push.spans == FARTHER
 
 
 def written(folder: Path, text: str) -> Path:
