@@ -37,6 +37,9 @@ class SpanLimits(StrictModel):
     shortest_part : float
         Shortest span as a part of the longest: a smaller part makes EI more certain, and takes
         longer, as stiff spans are approached in smaller steps.
+    nearer : float
+        How spans lie between both: 0 evenly, 1 each longer than the next by the same part, so that
+        there are more of them near the jaws.
     shortest_stroke_um : float
         Spans so short that less than this reaches the highest force are left out.
     beyond_um : float
@@ -55,6 +58,7 @@ class SpanLimits(StrictModel):
     shortest_um: float = Field(110.0, gt=0.0)
     longest_um: float = Field(600.0, gt=0.0)
     shortest_part: float = Field(0.2, gt=0.0, lt=1.0)
+    nearer: float = Field(0.0, ge=0.0, le=1.0)
     shortest_stroke_um: float = Field(3.0, gt=0.0)
     beyond_um: float = Field(80.0, ge=0.0)
     stroke_part: float = Field(0.1, gt=0.0, le=0.2)
@@ -64,7 +68,9 @@ class SpanLimits(StrictModel):
     strain_percent: float = Field(0.5, gt=0.0)
 
 
-FARTHER: Final = SpanLimits(longest_um=800.0, longest_stroke_um=70.0, shortest_part=0.15)
+FARTHER: Final = SpanLimits(
+    longest_um=800.0, longest_stroke_um=70.0, shortest_part=0.15, nearer=1.0
+)
 """For fibres of a millimetre and more that are not very soft: the farther out, the less depth and
 compliance of the clamp count."""
 
@@ -125,7 +131,7 @@ def plan_spans(
     clear -= settings.offset_um
     shortest = min(max(limits.shortest_um, limits.shortest_part * longest, clear), longest)
     remaining = limits.count - len(done)
-    positions = _spread(shortest, longest, limits.count)
+    positions = _spread(shortest, longest, limits)
     left = _farthest(positions, [span.nominal_um for span in done], remaining)
     left.sort(reverse=True)
     return tuple(_planned(position, ei, limits, settings) for position in left)
@@ -169,10 +175,13 @@ def _rough_ei(span: Span, settings: FitSettings) -> float | None:
     return ei if 0.0 < ei < math.inf else None
 
 
-def _spread(shortest: float, longest: float, count: int) -> list[float]:
-    if count == 1:
+def _spread(shortest: float, longest: float, limits: SpanLimits) -> list[float]:
+    if limits.count == 1:
         return [longest]
-    return [longest - (longest - shortest) * n / (count - 1) for n in range(count)]
+    parts = [n / (limits.count - 1) for n in range(limits.count)]
+    even = [longest - (longest - shortest) * part for part in parts]
+    by_part = [longest * (shortest / longest) ** part for part in parts]
+    return [one + limits.nearer * (other - one) for one, other in zip(even, by_part, strict=True)]
 
 
 def _farthest(positions: list[float], done: list[float], count: int) -> list[float]:

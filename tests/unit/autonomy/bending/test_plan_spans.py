@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosmic.autonomy.bending.plan import PlannedSpan, SpanLimits, guess_ei, plan_spans
+from cosmic.autonomy.bending.plan import FARTHER, PlannedSpan, SpanLimits, guess_ei, plan_spans
 from cosmic.autonomy.bending.result import BendingError
 from cosmic.autonomy.bending.settings import FitSettings
 from oracles.bent_fibre import Rig
@@ -94,3 +95,13 @@ def test_a_guess_that_is_no_stiffness_is_refused(guess: float) -> None:
 def test_a_free_length_that_is_no_number_is_refused() -> None:
     with pytest.raises(BendingError, match="too short"):
         plan_spans(float("nan"))
+
+
+def test_spans_that_grow_by_the_same_part_lie_nearer_to_the_jaws() -> None:
+    places = [each.span_um for each in plan_spans(1200.0, limits=FARTHER)]
+    assert places[0] == 800.0
+    even = plan_spans(1200.0, limits=FARTHER.model_copy(update={"nearer": 0.0}))
+    assert places[-1] == pytest.approx(even[-1].span_um)
+    assert places[2] < even[2].span_um - 50.0
+    ratios = [one / other for one, other in pairwise(places)]
+    assert ratios == pytest.approx([ratios[0]] * 4)
