@@ -161,7 +161,8 @@ def test_a_compressed_fibre_without_a_sign_is_certain() -> None:
 def test_on_a_compressed_image_a_network_that_sees_no_joint_makes_more_certain() -> None:
     weak = Joints(along=np.full((len(NAMES), 1), 0.35))
     unasked, clear, gloss, joined = (
-        probability(Signs(weak, compressed=2.0, joint=level), []) for level in (None, 0.0, 0.48, 1.0)
+        probability(Signs(weak, compressed=2.0, joint=level), [])
+        for level in (None, 0.0, 0.48, 1.0)
     )
     assert clear >= CERTAIN > unasked
     assert gloss >= unasked > joined

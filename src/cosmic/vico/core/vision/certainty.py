@@ -118,7 +118,7 @@ class Signs:
         """
         noise = np.full(len(NAMES), NOISE)
         noise[-1] = NOISE_AS_JPEG if self.coded else NOISE
-        return np.maximum(self._at(weights) - noise[: len(weights)], 0.0)
+        return np.asarray(np.maximum(self._at(weights) - noise[: len(weights)], 0.0))
 
     def taken_by(self, weights: Sequence[float]) -> float:
         """Return what signs take off the logit."""
