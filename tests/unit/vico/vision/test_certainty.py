@@ -92,20 +92,6 @@ def test_a_joint_that_shows_in_no_single_sign_is_not_certain(seed: int) -> None:
     assert wrong(drawn_cases(one)) == 0
 
 
-def test_dust_at_an_edge_is_no_ledge_and_a_step_of_the_edges_is_one() -> None:
-    line = arc((60.0, 200.0), 0.0, 400.0, 0.0)
-    clean = drawn_image([line], [12.0], noise=2.0)
-    dusty = clean.copy()
-    cv2.circle(dusty, (260, 209), 5, 95, -1, cv2.LINE_AA)
-    half = len(line) // 2
-    stepped = drawn_image([line[:half], line[half - 1 :]], [12.0, 10.5], noise=2.0)
-    even, dust, step = (
-        find_fibres(image)[0].signs[SIGNS.index("ledge")] for image in (clean, dusty, stepped)
-    )
-    assert max(even, dust) < 0.3
-    assert step > 0.8
-
-
 def test_what_goes_on_faintly_beyond_an_end_is_seen() -> None:
     line = arc((60.0, 200.0), 0.0, 250.0, 0.0)
     image = drawn_image([line], [12.0], noise=2.0).astype(np.float32)

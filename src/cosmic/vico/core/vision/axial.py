@@ -256,8 +256,6 @@ def _abrupt(
     none = np.zeros((2, len(seen)))
     if len(seen) < 2 * size + 1:
         return [none, none]
-    # Dust beside a fibre comes and goes within a width.
-    values[:2] = [levelled(each, 2 * max(int(width), DUST_PX) + 1) for each in values[:2]]
     away = np.arange(-size, size + 1)
     sides = np.sign(away) * (np.abs(away) > round(0.5 * blur))
     kernel = sides - (sides @ away) / (away @ away) * away
