@@ -39,14 +39,14 @@ def test_a_fibre_below_four_pixels_has_no_such_sign() -> None:
     assert sign(drawn_image([LINE], [3.0], noise=1.0)) == 0.0
 
 
-@pytest.mark.parametrize("quality", [75, 85])
+@pytest.mark.parametrize("quality", [40, 75, 85])
 def test_on_a_compressed_image_a_joint_is_seen_as_well(quality: int) -> None:
     assert sign(compressed(touching(14.0), quality)) > 1.0
     assert sign(compressed(drawn_image([LINE], [14.0], noise=2.0), quality)) < 0.5
 
 
 def test_what_is_mostly_blocks_is_not_looked_at() -> None:
-    assert sign(compressed(touching(14.0), 40)) == 0.0
+    assert sign(compressed(touching(14.0), 30)) == 0.0
 
 
 def test_the_sign_depends_on_neither_depth_nor_side_nor_polarity() -> None:

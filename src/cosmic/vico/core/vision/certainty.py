@@ -35,32 +35,37 @@ WEIGHTS: Final = (
     0.10, 0.10, 0.31, 0.10, 0.10, 0.10, 0.91, 0.55, 0.22, 0.16, 0.10, 4.73, 3.16, 0.10, 7.58,
 )  # fmt: skip
 JPEG_WEIGHTS: Final = (
-    1.63, 3.51, 2.35, 0.38, 0.10, 0.36, 0.62, 1.96, 0.10, 1.01, 0.10, 3.81, 0.24, 0.67, 6.80,
+    0.10, 2.69, 2.04, 0.52, 0.10, 0.69, 0.65, 1.85, 0.10, 0.43, 0.10, 3.01, 2.75, 0.77, 6.63,
 )  # fmt: skip
 """Without the learned sign, fitted to 4951 fibres and pairs; with it, to the 3395 of them on images
-without the blocks of JPEG, and to 842 on images with them. Right and wrong ones are alike in say,
+without the blocks of JPEG, and to 1281 on images with them. Right and wrong ones are alike in say,
 and a tenth is a floor."""
 HAND_LOGIT: Final = 5.58
 FITTED_LOGIT: Final = 5.64
-JPEG_LOGIT: Final = 8.17
+JPEG_LOGIT: Final = 8.51
 """Logit of the probability where there is no sign, on images of which a half is no single fibre."""
 PRIOR_ODDS: Final = 60.0
 """Whole fibres for each that is two or a part, among what is found: a guess, on the safe side."""
-MORE_ODDS: Final = 2.0
+MORE_ODDS: Final = 2.4
 """So much more probable than the hand-made signs alone say a fibre is at most, where a network
 sees no joint: it may be blind to what it was not shown."""
-HIDDEN_ODDS: Final = 4.5
-"""So much less probable than fitted a fibre is where an image shows the blocks of JPEG. Without it
-about two of a thousand pairs are certain and wrong there, and with it fewer than one."""
+HIDDEN_ODDS: Final = 10.0
+"""So much less probable than fitted a fibre is where an image shows the blocks of JPEG. With less
+than nine about one of a thousand pairs is certain and wrong there."""
 DOUBT: Final = 6.0
 """What each reason to doubt takes off: a guess."""
 NOISE: Final = 0.25
 """So clear is a sign in the clearest place of any fibre: only what is above it counts."""
+NOISE_AS_JPEG: Final = 0.1
+"""The same of the learned sign where compression hides joints: what is left of them is fainter."""
 BLOCKY: Final = 0.5
 """Of borders of JPEG's blocks: from half as much again, about quality 80, more hides no more."""
-MOST_BLOCKY: Final = 6.0
-"""From there on no network looks: neighbours differ four times as much across borders of blocks as
-elsewhere (quality 50 with some noise, 65 with little)."""
+MOST_BLOCKY: Final = 24.0
+"""From there on no network looks: neighbours differ thirteen times as much across borders of blocks
+as elsewhere (quality 25 to 50)."""
+SEEN: Final = 0.5
+"""So clearly a network sees a joint which no hand-made sign need show, on an image with blocks of
+JPEG. Gloss along cords that are whole was no clearer than 0.35."""
 MOST_ALONG: Final = 4.0
 MOST: Final = 1.5
 INTERVAL_STDS: Final = 2.0
@@ -111,7 +116,9 @@ class Signs:
         Those along the fibre are of the one place where together they weigh most: a joint is in
         one place, the unevenness of one fibre is scattered.
         """
-        return np.maximum(self._at(weights) - NOISE, 0.0)
+        noise = np.full(len(NAMES), NOISE)
+        noise[-1] = NOISE_AS_JPEG if self.coded else NOISE
+        return np.asarray(np.maximum(self._at(weights) - noise[: len(weights)], 0.0))
 
     def taken_by(self, weights: Sequence[float]) -> float:
         """Return what signs take off the logit."""
@@ -145,11 +152,12 @@ def probability(signs: Signs, doubts: Sequence[str]) -> float:
         return 0.0
     logit = HAND_LOGIT - signs.taken_by(HAND_WEIGHTS)
     if signs.joint is not None and signs.coded:
-        # What gloss and blocks look like to a network takes nothing from what is certain without
-        # it; and where it has looked, what compression hides counts once.
+        # Where it has looked, what compression hides counts once. What gloss and blocks look like
+        # to a network takes nothing from what is certain without it, but a clear joint does.
         both = JPEG_LOGIT - signs.taken_by(JPEG_WEIGHTS) - log(HIDDEN_ODDS)
         plain = HAND_LOGIT - replace(signs, compressed=0.0).taken_by(HAND_WEIGHTS)
-        logit = max(logit, min(both, plain + log(MORE_ODDS)))
+        looked = min(both, plain + log(MORE_ODDS))
+        logit = looked if signs.joint > SEEN else max(logit, looked)
     elif signs.joint is not None:
         both = FITTED_LOGIT - signs.taken_by(WEIGHTS)
         logit = min(both, logit + log(MORE_ODDS))
