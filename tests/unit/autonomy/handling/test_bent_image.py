@@ -119,6 +119,23 @@ def test_what_jumps_away_from_the_fibre_is_left_out() -> None:
     assert np.abs(found.aside_um - uniform(found.ahead_um)).max() < 4.0
 
 
+def test_what_draws_the_middle_aside_without_a_jump_is_left_out() -> None:
+    x = columns_um()
+    drawn_back = uniform(np.maximum(x, 0.0)) - 6.0 * np.exp(-(((x - 280.0) / 40.0) ** 2))
+    found = bent(drawn(0.0, seed=10), drawn(drawn_back, seed=11))
+    assert len(found.ahead_um) > 18
+    assert np.abs(found.aside_um - uniform(found.ahead_um)).max() < 3.5
+
+
+def test_a_fibre_that_is_bent_at_a_weak_place_is_seen_so() -> None:
+    x = columns_um()
+    weak = uniform(np.maximum(x, 0.0)) + 0.03 * np.maximum(x - 250.0, 0.0)
+    found = bent(drawn(0.0, seed=12), drawn(weak, seed=13))
+    assert len(found.ahead_um) > 25
+    off = found.aside_um - uniform(found.ahead_um)
+    assert off[-3:].mean() == pytest.approx(0.03 * (found.ahead_um[-3:].mean() - 250.0), abs=1.0)
+
+
 def test_images_without_the_fibre_or_at_another_magnification_show_nothing() -> None:
     empty = SimpleNamespace(data=np.full((300, 400), 180.0))
     assert len(bent(empty, empty).ahead_um) == 0
