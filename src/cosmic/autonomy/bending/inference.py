@@ -193,10 +193,9 @@ def readings_of(
     if glass:
         # Glass rubs and shears otherwise than fibres do.
         to_common[:, [FRICTION, SHEAR]] = 0.0
-        own = (*own[1:], ("friction", "", friction, 0.0, settings.friction_std))
-    else:
-        # It was found as if all contacts lay where they are told to.
-        to_common[:, CONTACT] += direction.by_contact * response.by_direction[span]
+        own = (*own, ("friction", "", friction, 0.0, settings.friction_std))
+    # The direction was found as if all contacts lay where they are told to.
+    to_common[:, CONTACT] += direction.by_contact * response.by_direction[span]
     same = span[:, None] == span[None, :]
     freed = None if glass else _freed(fits, rows, holds)
     if freed is not None:

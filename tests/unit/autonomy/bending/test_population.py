@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cosmic.autonomy.bending.curved import NaturalShape
-from cosmic.autonomy.bending.fit import Certificate, MeasuredFibre, fit_campaign
+from cosmic.autonomy.bending.fit import Certificate, MeasuredFibre, assess_campaign, fit_campaign
 from cosmic.autonomy.bending.fit import measure_fibre as measure
 from cosmic.autonomy.bending.response import direction_by_touch
 from cosmic.autonomy.bending.settings import FitSettings
@@ -94,3 +94,15 @@ def test_jaws_far_softer_than_they_are_believed_to_be_are_found() -> None:
     ]
     assert abs(np.mean(off)) < 0.01
     assert np.sqrt(np.mean(np.square(off))) < 0.02
+
+
+@pytest.mark.parametrize("shown_deg", [-8.0, -5.0, 5.0, 8.0])
+def test_a_standard_whose_direction_the_image_has_wrong_is_believed_less(shown_deg: float) -> None:
+    session, fibres = drawn(WORLD, 9, 4)
+    beam = Fibre.standard(session)
+    beams = [spans_of(session, beam, shown_deg=shown_deg) for _ in range(3)]
+    scale = assess_campaign(
+        [measured(session, each) for each in fibres],
+        standards=[measure(each, settings=SETTINGS, certificate=CERTIFICATE) for each in beams],
+    ).scale
+    assert abs(scale.off_part) < 2.0 * scale.off_std_part
