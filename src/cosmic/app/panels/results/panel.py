@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from PySide6.QtCore import QPointF, Qt, QTimer, QUrl
-from PySide6.QtGui import QColor, QDesktopServices, QHideEvent, QImage, QPen, QPolygonF, QShowEvent
+from pyqtgraph.functions import arrayToQPolygonF
+from PySide6.QtCore import Qt, QTimer, QUrl
+from PySide6.QtGui import QColor, QDesktopServices, QHideEvent, QImage, QPen, QShowEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QSplitter,
@@ -355,7 +356,9 @@ def _curve_image(path: Path) -> QImage:
     image.fill(Qt.GlobalColor.transparent)
     with painting(image) as painter:
         painter.setPen(QPen(QColor(OKABE_ITO["orange"]), 1.2))
-        painter.drawPolyline(QPolygonF([QPointF(x, y) for x, y in zip(across, up, strict=True)]))
+        # All points at once: hundreds of Qt's objects, made while another thread collects garbage,
+        # have ended the process.
+        painter.drawPolyline(arrayToQPolygonF(across, up))
     return image
 
 
