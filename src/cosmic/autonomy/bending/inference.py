@@ -161,9 +161,9 @@ def readings_of(
     response: Response,
     settings: FitSettings,
     *,
+    direction: Direction,
     part: float = 0.0,
     certified: tuple[float, float] | None = None,
-    direction: Direction | None = None,
     slipped: bool = False,
     holds: Holds = UNKNOWN_HOLDS,
 ) -> Readings:
@@ -171,12 +171,12 @@ def readings_of(
 
     Parameters
     ----------
+    direction : Direction
+        In which the fibre leaves the jaws.
     part : float
         Of the campaign that was over, 0 to 1: the gain drifts.
     certified : tuple of float, optional
         Of a standard: ln(EI), EI in uN um2, and its standard uncertainty.
-    direction : Direction, optional
-        In which the fibre leaves the jaws; as the image shows it if None.
     slipped, holds : bool, Holds
         See `Readings`; and how far sections of the campaign are held.
     """
@@ -187,7 +187,6 @@ def readings_of(
     friction = np.array([each.by_friction for each in rows])
     glass = certified is not None
     softer, by_shear, shear = _sheared(response.by_square[span], settings, glass=glass)
-    direction = direction or Direction(0.0, math.radians(settings.direction_std_deg))
     to_common = _to_common(fits, rows, friction, response, by_shear, part)
     own = (*_own(response, span, settings, direction), shear)
     if glass:
