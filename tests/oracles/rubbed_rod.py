@@ -93,11 +93,11 @@ class RubbedRod:
         length, ei = self.abscissa_um, self.ei_un_um2
         return np.array([ei / length, ei / length**2, ei / length**2, length])
 
-    def _solve(self, travel_um: float, held: str | float) -> np.ndarray:
+    def _solve(self, travel_um: float, held: str | float) -> np.ndarray | None:
+        """Return what balances; None where nothing near does."""
         begin = self._found / self._scales()
         found = root(self._missed, begin, (travel_um, held), method="hybr", tol=TIGHT)
-        assert np.abs(found.fun).max() < 1e-7, found.message
-        return found.x * self._scales()
+        return found.x * self._scales() if np.abs(found.fun).max() < 1e-7 else None
 
     def rubs(self, at: np.ndarray) -> float:
         """Return friction as a part of the normal force; positive pulls the fibre outwards."""
@@ -119,11 +119,19 @@ class RubbedRod:
             force = 3.0 * self.ei_un_um2 * travel_um / place**3
             self._found = np.array([-force * place, -force, 0.0, place])
         found = self._solve(travel_um, "sticks")
-        rubs = self.rubs(found)
-        if abs(rubs) > self.friction:
-            rubs = float(np.copysign(self.friction, rubs))
-            found = self._solve(travel_um, rubs)
-            heading = self._end(found)[2]
-            self.rolled_um = found[3] - self.radius_um * heading
+        if found is None or abs(self.rubs(found)) > self.friction:
+            found = self._slid(travel_um)
         self._found = found
-        return -found[1], -found[2], rubs
+        return -found[1], -found[2], self.rubs(found)
+
+    def _slid(self, travel_um: float) -> np.ndarray:
+        """Return what balances as it slides: outwards on a fibre that friction pulls outwards."""
+        for rubs in (self.friction, -self.friction):
+            found = self._solve(travel_um, rubs)
+            if found is None:
+                continue
+            rolled = float(found[3] - self.radius_um * self._end(found)[2])
+            if (rolled - self.rolled_um) * rubs >= 0.0:
+                self.rolled_um = rolled
+                return found
+        raise ArithmeticError(f"neither sticks nor slides at {travel_um} um")

@@ -446,8 +446,8 @@ class Fibre:
             found = self._held_at_one_end(hold, line.free, abscissa_um, probe, time_s)
             # What crept stands back: the contact itself does not slide while the probe stands.
             part, sides = 0.0, found.sides(self._lifting.part)
-            if len(sides) == 2:
-                part = self._rubbing.follow(sides[0], sides[1], travel_um, back_um)
+            if len(sides) > 1:
+                part = self._rubbing.follow(sides[0], sides[-1], travel_um, back_um)
             if found.askew is not None:
                 forces_un = partial(found.forces_un, part)
                 self._lifting.follow(forces_un, travel_um, back_um, height_um, found.askew)
@@ -539,7 +539,7 @@ class Fibre:
             ei,
             ei / float(across.mean()),
             section.thickness_um(hold.at_um, roll),
-            tuple(cantilever(each) for each in ((friction, -friction) if friction else (0.0,))),
+            tuple(cantilever(each) for each in ((friction, 0.0, -friction) if friction else (0.0,))),
         )
 
     @property
@@ -575,8 +575,8 @@ class _Curves:
     Attributes
     ----------
     curves : tuple of tuple of PushCurve
-        With all friction that pulls the fibre outwards, then inwards; each with all friction down,
-        then up.
+        With all friction that pulls the fibre outwards, none, and all inwards; each with all
+        friction down, then up.
     """
 
     place_um: float
@@ -599,11 +599,11 @@ class _Curves:
 
     def push(self, part: float, held: float) -> PushCurve | Push:
         """Return the push for friction along the fibre, -1 to 1, and a part of the force up."""
-        both = self.sides(held)
-        return both[0] if len(both) == 1 else RubbedPush(both[0], both[1], part)
+        sides = self.sides(held)
+        return sides[0] if len(sides) == 1 else RubbedPush(sides[0], sides[1], sides[2], part)
 
     def sides(self, held: float) -> list[PushCurve | HeldPush]:
-        """Return the pushes with all friction along the fibre, outwards and inwards, if any."""
+        """Return the pushes with all friction along that pulls outwards, none, all inwards."""
         most = 1.0 if self.askew is None else self.askew.most
         return [
             each[0] if len(each) == 1 else HeldPush(each[0], each[1], held / most)

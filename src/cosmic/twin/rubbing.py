@@ -12,6 +12,9 @@ from cosmic.twin.rod import PushCurve
 
 ROUNDS: Final = 6
 LEAST_UN: Final = 1e-9
+FARTHEST: Final = 0.5
+"""From the middle between both frictions there is none, at most."""
+
 
 
 @dataclass(slots=True)
@@ -29,7 +32,7 @@ class Rubbing:
     turn_um : float
         By how much the contact itself gives along, from all friction one way to the other.
     part : float
-        Part of the friction there is: 1 pulls the fibre outwards, -1 inwards.
+        Between all friction there is, 1, which pulls the fibre outwards, and -1, inwards.
     """
 
     probe_un_um: float
@@ -59,11 +62,11 @@ class Rubbing:
         if self._stuck_um is None:
             self._stuck_um = 0.5 * (outwards.slid_um(back_um) + inwards.slid_um(back_um))
         bent_um = travel_um + back_um
-        low = outwards.slid_um(bent_um) + outwards.along_un(travel_um) / self.probe_un_um
-        high = inwards.slid_um(bent_um) + inwards.along_un(travel_um) / self.probe_un_um
-        middle = 0.5 * (low + high)
+        least = outwards.slid_um(bent_um) + outwards.along_un(travel_um) / self.probe_un_um
+        most = inwards.slid_um(bent_um) + inwards.along_un(travel_um) / self.probe_un_um
+        middle = 0.5 * (least + most)
         # Friction always moves a fibre the way that it pulls: below 0 is rounding.
-        gives = 0.5 * (max(high - low, 0.0) + self.turn_um)
+        gives = 0.5 * (max(most - least, 0.0) + self.turn_um)
         part = (middle - self._stuck_um) / gives
         if abs(part) > 1.0:
             part = math.copysign(1.0, part)
@@ -235,9 +238,14 @@ class HeldPush(Push):
 
 @dataclass(slots=True)
 class RubbedPush(Push):
-    """A push between those with all friction that pulls the fibre outwards, and inwards."""
+    """A push between those with all friction that pulls the fibre outwards, and inwards.
+
+    Friction moves a soft probe along, nearer to the clamp or farther, and the force across goes
+    with that, not evenly: what it is without friction is between.
+    """
 
     outwards: Push | PushCurve
+    free: Push | PushCurve
     inwards: Push | PushCurve
     part: float
 
@@ -258,4 +266,14 @@ class RubbedPush(Push):
     def both_un(self, travel_um: float) -> tuple[float, float]:
         one, along_one = self.outwards.both_un(travel_um)
         other, along_other = self.inwards.both_un(travel_um)
-        return between(one, other, self.part), between(along_one, along_other, self.part)
+        across, along = (
+            between(one, other, self.part),
+            between(along_one, along_other, self.part),
+        )
+        if abs(self.part) < 1.0 and along_one != along_other:
+            free, along_free = self.free.both_un(travel_um)
+            at = (2.0 * along_free - along_one - along_other) / (along_one - along_other)
+            at = min(max(at, -FARTHEST), FARTHEST)
+            bow = (free - between(one, other, at)) / (1.0 - at * at)
+            across += bow * (1.0 - self.part * self.part)
+        return across, along
