@@ -511,6 +511,7 @@ class Fibre:
 
     def _solve(self, hold: Hold, free: Free, probe: "ProbeShape", ei: float) -> "_Solved":
         friction, section, roll = self._contact.probe_friction, self._section, hold.fate.roll_rad
+        rubbed = (friction, 0.0, -friction) if friction else (0.0,)
         begin, outwards = hold.at_um, hold.outwards
         near = begin + outwards * np.linspace(0.0, 0.5 * free.length_um, 40)
         across, _, _ = section.flexibility(near, roll)
@@ -519,14 +520,14 @@ class Fibre:
             across, _, _ = section.flexibility(begin + outwards * along_um, roll)
             return np.asarray(1.0 / across)
 
-        def cantilever(rubbed: float) -> Cantilever:
+        def cantilever(pulled: float) -> Cantilever:
             return Cantilever(
                 free.abscissas_um,
                 free.asides_um,
                 ei_un_um2=ei,
                 depth_um=hold.depth_um,
                 radius_um=probe.edge_um + self.seen_um / 2.0,
-                friction=rubbed,
+                friction=pulled,
                 turn_rad_un_um=math.radians(self._contact.jaw_turn_deg) * 1e-3,
                 side_un_um=self._contact.jaw_side_un_um,
                 probe_un_um=self._contact.probe_side_un_um,
@@ -539,7 +540,7 @@ class Fibre:
             ei,
             ei / float(across.mean()),
             section.thickness_um(hold.at_um, roll),
-            tuple(cantilever(each) for each in ((friction, 0.0, -friction) if friction else (0.0,))),
+            tuple(cantilever(each) for each in rubbed),
         )
 
     @property
