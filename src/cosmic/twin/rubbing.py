@@ -16,7 +16,6 @@ FARTHEST: Final = 0.5
 """From the middle between both frictions there is none, at most."""
 
 
-
 @dataclass(slots=True)
 class Rubbing:
     """Friction along the fibre: the contact sticks as long as friction can hold it.
