@@ -3,8 +3,9 @@
 A generator of measurements that knows nothing of the analysis, nor of the twin. For a load and a
 length the rod is marched from the contact, where nothing bends it, back to the clamp, and the whole
 is then turned so that it leaves the clamp as it must: nothing is sought but the length that brings
-the probe to where it stands. Clamp, probe and sensor give way, the probe rubs, the fibre relaxes,
-yields, is weak in places and shears; the instrument has a wrong scale, drifts and plays.
+the probe to where it stands. Clamp, probe and sensor give way, the fibre relaxes, yields, is weak in
+places and shears; the instrument has a wrong scale, drifts and plays. The probe rubs: as long as
+friction can hold it, it goes along with the place of the fibre that it touches.
 
 A fibre's true stiffness is the flexural rigidity averaged over its longest span as compliance
 weighs it, one second after a step.
@@ -15,6 +16,7 @@ Run as a program it answers requests on standard input, and tells the truth last
 
 import hashlib
 import json
+import math
 import secrets
 import sys
 from dataclasses import dataclass, field, replace
@@ -24,6 +26,7 @@ import numpy as np
 Floats = np.ndarray
 
 STEPS = 48
+SUBSTEPS = 6
 LOADS = 14
 LENGTHS = 13
 HEAVIEST = 1.1
@@ -71,6 +74,7 @@ class World:
     thickness_um: tuple = (12.0, 0.2)
     shear: float = 0.0
     friction: tuple = (0.0, 0.0)
+    slides: bool = False  # at once, whatever friction could hold
     adhesion_un: float = 0.0
     clamp: tuple = ("normal", 10.0, 0.0)
     turn: float = 0.0
@@ -251,7 +255,38 @@ def _along(world: World, rng: np.random.Generator, nodes: Floats) -> Floats:
     return np.asarray(np.interp(nodes, coarse, sigma * drawn))
 
 
-def curves(
+@dataclass
+class Balance:
+    """Equilibria, each (places, friction, loads): with friction one way, none, the other way.
+
+    Travel, force across and along, and how far the fibre has slid past the probe. And where the
+    probe first touches, (places,).
+    """
+
+    travel: Floats
+    across: Floats
+    along: Floats
+    slid: Floats
+    touch: Floats
+
+
+def curves(fibre: Fibre, places_um: Floats, **rig: float) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return travel, force across and force along, each (places, out and back, loads).
+
+    Of a probe that slides at once. And where it first touches, (places,).
+    """
+    found = balance(fibre, places_um, **rig)
+    # Which way the probe rubs on its way out is where the contact wanders along the fibre.
+    ends = found.slid[:, [0, 2]]
+    wanders = (ends.mean(axis=1) - ends.mean(axis=1)[:, :1])[:, None, :] < 0.0
+    travel, across, along = (
+        np.where(wanders, values[:, [2, 0]], values[:, [0, 2]])
+        for values in (found.travel, found.across, found.along)
+    )
+    return travel, across, along, found.touch
+
+
+def balance(
     fibre: Fibre,
     places_um: Floats,
     *,
@@ -259,16 +294,13 @@ def curves(
     side_un_um: float = 1e6,
     radius_um: float = 25.0,
     spring_un_um: float = 1e9,
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return travel, force across and force along, each (places, out and back, loads).
-
-    And where the probe first touches, (places,).
-    """
-    shape = (len(places_um), 2, LOADS, LENGTHS)
+) -> Balance:
+    """Return what pushes at places come to."""
+    shape = (len(places_um), 3, LOADS, LENGTHS)
     length = (places_um + fibre.depth_um)[:, None, None, None]
     load = HEAVIEST * np.linspace(0.0, 1.0, LOADS) ** 1.3
     normal = np.broadcast_to(load[None, None, :, None] * fibre.ei / length**2, shape)
-    sign = np.array([1.0, -1.0])[None, :, None, None]
+    sign = np.array([1.0, 0.0, -1.0])[None, :, None, None]
     rub = np.broadcast_to(fibre.friction * sign, shape)
     line = fibre.line()
     arcs = np.linspace(0.0, fibre.free_um, len(line))
@@ -319,13 +351,8 @@ def curves(
         for values, into in zip((at_y, across, along, slid), found, strict=True):
             into[index] = np.interp(0.0, off, values.reshape(shape)[index])
     tip_y, across, along, slid = found
-    # Which way the probe rubs on its way out is where the contact wanders along the fibre.
-    wanders = (slid.mean(axis=1) - slid.mean(axis=1)[:, :1])[:, None, :] < 0.0
-    tip_y, across, along = (
-        np.where(wanders, values[:, ::-1], values) for values in (tip_y, across, along)
-    )
     travel = tip_y[:, :, :1] - tip_y + across / spring_un_um
-    return travel, across, along, tip_y[:, 0, 0]
+    return Balance(travel, across, along, slid, tip_y[:, 0, 0])
 
 
 @dataclass
@@ -351,7 +378,7 @@ def pushes(
         if number + first == fibre.moves_in:
             true[number] += rng.choice([-1, 1]) * world.moved_um
     true = np.maximum(true, 20.0)
-    travel, across, along, touch = curves(
+    found = balance(
         fibre,
         true,
         jaw_un_um=session.jaw_un_um,
@@ -364,19 +391,69 @@ def pushes(
             fibre,
             plan[n],
             number=n + first,
-            curve=(travel[n], across[n], along[n]),
-            hinge_um=fibre.held_y_um - touch[n] + world.touch_um * rng.standard_normal(),
+            at=Balance(*(values[n] for values in vars(found).values())),
+            hinge_um=fibre.held_y_um - found.touch[n] + world.touch_um * rng.standard_normal(),
         )
         for n in range(len(plan))
     ]
 
 
-def _push(session: Session, fibre: Fibre, plan, *, number: int, curve, hinge_um: float) -> Push:
+def rubbed(at: Balance, press: Floats) -> tuple[Floats, Floats]:
+    """Return forces across and along while the probe goes from travel to travel.
+
+    The contact stays where it is on the fibre as long as friction can hold it there.
+    """
+    steps = np.linspace(press[:-1], press[1:], SUBSTEPS + 1)[1:].T.ravel()
+    fine = np.concatenate([press[:1], steps])
+    slid, across, along = (
+        np.array([np.interp(fine, at.travel[n], values[n]) for n in range(3)])
+        for values in (at.slid, at.across, at.along)
+    )
+
+    def mixed(values: Floats, part: Floats) -> Floats:
+        return values[1] + part * (
+            0.5 * (values[0] - values[2]) + part * (0.5 * (values[0] + values[2]) - values[1])
+        )
+
+    parts, stays = np.zeros(len(fine)), at.slid[1, 0]
+    for n, travel in enumerate(fine):
+        if travel <= 0.0:
+            stays = at.slid[1, 0]
+            continue
+        ahead, none, back = slid[:, n].tolist()
+        slope, bend, left = 0.5 * (ahead - back), 0.5 * (ahead + back) - none, stays - none
+        root = slope + math.copysign(math.sqrt(max(slope**2 + 4.0 * bend * left, 0.0)), slope)
+        parts[n] = min(max(2.0 * left / root, -1.0), 1.0) if root else 0.0
+        stays = mixed(slid[:, n], parts[n])
+    free = fine > 0.0
+    each = slice(None, None, SUBSTEPS)
+    return (free * mixed(across, parts))[each], (free * mixed(along, parts))[each]
+
+
+def slid_at_once(at: Balance, press: Floats, loading: Floats) -> tuple[Floats, Floats]:
+    """Return the same of a probe that slides at once, and turns round over a part of the way."""
+    first = 0 if at.slid[1].mean() > at.slid[1, 0] else 2
+    if at.slid[0].mean() > at.slid[2].mean():
+        first = 2 - first
+
+    def of(state: int, values: Floats) -> Floats:
+        return np.interp(press, at.travel[state], values[state], left=0.0)
+
+    gone = np.where(loading, 0.0, np.maximum(press.max() - press, 0.0)) / press.max()
+    out = np.exp(-gone / BLEND_PART)
+    return tuple(
+        out * of(first, values) + (1.0 - out) * of(2 - first, values)
+        for values in (at.across, at.along)
+    )
+
+
+def _push(
+    session: Session, fibre: Fibre, plan, *, number: int, at: Balance, hinge_um: float
+) -> Push:
     world, rng = session.world, session.rng
     place, stroke = plan
-    travel, across, along = curve
     if not fibre.is_fibre:  # something that stands on the plate: as stiff wherever it is pushed
-        across = across * 0.0 + 0.8 * travel
+        at = replace(at, across=0.8 * at.travel)
     free = np.array([-12.0, -6.0, -3.0]) * min(1.0, stroke / 10.0)
     out = np.concatenate([free, np.linspace(0.02, 1.0, 10) * stroke])
     dwell = np.full(6 if world.dwell_s else 0, stroke)
@@ -403,17 +480,7 @@ def _push(session: Session, fibre: Fibre, plan, *, number: int, curve, hinge_um:
     bent = world.set_part * over / np.maximum(strain.max(), 1e-9) * stroke
     fibre.set_seen = max(fibre.set_seen, float(bent[-1]))
     press = real - slip - bent
-    force = np.where(
-        loading,
-        np.interp(press, travel[0], across[0], left=0.0),
-        np.interp(press, travel[1], across[1], left=0.0),
-    )
-    side = np.interp(press, travel[0], along[0], left=0.0)
-    top = len(out) + len(dwell)
-    # Until the probe slides back the friction turns round.
-    gone = np.maximum(stroke - real[top:], 0.0) / stroke
-    before = np.interp(press[top:], travel[0], across[0], left=0.0)
-    force[top:] += (before - force[top:]) * np.exp(-gone / BLEND_PART)
+    force, side = slid_at_once(at, press, loading) if world.slides else rubbed(at, press)
     since = time[:, None] - time[None, :]
     held = np.log10(np.maximum(since, 0.0) + 0.05)
     grown = np.diff(force, prepend=0.0)
@@ -424,7 +491,7 @@ def _push(session: Session, fibre: Fibre, plan, *, number: int, curve, hinge_um:
         clinging = (
             ~loading
             & (press <= 0.0)
-            & (press > -world.adhesion_un * travel[0][1] / max(across[0][1], 1e-9))
+            & (press > -world.adhesion_un * at.travel[1][1] / max(at.across[1][1], 1e-9))
         )
         force = force - clinging * world.adhesion_un * 0.7
     force = np.where(loading | (press > -20.0), force, 0.0)

@@ -50,7 +50,8 @@ class _Table:
     """What a push meets, by load (rows) and place of the probe (columns), without units.
 
     Deflection is a part of the length, forces are in EI/length^2, the arc from the jaws' tip to the
-    contact is a part of the length; length counts from the clamp to the probe.
+    contact, and what of it slides, are parts of the length; length counts from the clamp to the
+    probe.
     """
 
     log_lengths: Floats
@@ -58,6 +59,7 @@ class _Table:
     forces: Floats
     alongs: Floats
     arcs: Floats
+    slids: Floats
 
 
 class Cantilever:
@@ -114,7 +116,7 @@ class Cantilever:
         along = np.concatenate([[0.0], np.cumsum(steps)])
         self._s = np.concatenate([[-depth_um], along, [BEYOND * self._free_um]])
         none = np.zeros(1)
-        self._asked: tuple[float, tuple[Floats, Floats, Floats]] = math.nan, (none, none, none)
+        self._asked: tuple[float, tuple[Floats, ...]] = math.nan, (none, none, none, none)
 
     def curve(self, abscissa_um: float, *, sensor_un_um: float, stiffer: float = 1.0) -> PushCurve:
         """Return force over travel of a probe whose middle stands at an abscissa from the tip.
@@ -130,12 +132,12 @@ class Cantilever:
         if abscissa_um != asked_um:  # a fibre asks for one place several times
             found = self._met(abscissa_um)
             self._asked = abscissa_um, found
-        deflections, forces, alongs = found
+        deflections, forces, alongs, slids = found
         deflections = deflections + (stiffer - 1.0) * forces / self._side
-        return PushCurve(deflections, stiffer * forces, sensor_un_um, stiffer * alongs)
+        return PushCurve(deflections, stiffer * forces, sensor_un_um, stiffer * alongs, slids)
 
-    def _met(self, abscissa_um: float) -> tuple[Floats, Floats, Floats]:
-        """Return deflections and forces, across and along, at a place, load by load."""
+    def _met(self, abscissa_um: float) -> tuple[Floats, ...]:
+        """Return deflections, forces across and along, and where it touches, load by load."""
         table = self._table
         length = max(abscissa_um + self._depth, math.exp(table.log_lengths[0]))
         weights, columns = _between(table.log_lengths, math.log(length))
@@ -143,16 +145,17 @@ class Cantilever:
         forces = table.forces[:, columns] @ weights * (self._ei / length**2)
         alongs = table.alongs[:, columns] @ weights * (self._ei / length**2)
         arcs = table.arcs[:, columns] @ weights * length
+        slids = table.slids[:, columns] @ weights * length
         last = _last(deflections, forces, arcs, self._free_um)
         if last < len(arcs) and last > 0 and arcs[last - 1] < self._free_um < arcs[last]:
             # It slides off on its way to the next load.
             part = (self._free_um - arcs[last - 1]) / (arcs[last] - arcs[last - 1])
-            for values in (deflections, forces, alongs):
+            for values in (deflections, forces, alongs, slids):
                 values[last] = values[last - 1] + part * (values[last] - values[last - 1])
             last += 1
         last = max(last, 1)
         deflections[0] = forces[0] = alongs[0] = 0.0
-        return deflections[:last], forces[:last], alongs[:last]
+        return deflections[:last], forces[:last], alongs[:last], slids[:last]
 
     @cached_property
     def _table(self) -> _Table:
@@ -163,17 +166,18 @@ class Cantilever:
             SHORTEST_UM + self._depth, float(np.max(pushed.x[0])) + self._depth, PLACES
         )
         rows = [self._row(pushed, number, np.log(lengths)) for number in range(LOADS)]
-        y, forces, alongs, arcs = (np.array(each) for each in zip(*rows, strict=True))
-        return _Table(np.log(lengths), (y[0] - y) / lengths, forces, alongs, arcs / lengths)
+        y, forces, alongs, arcs, slids = (np.array(each) for each in zip(*rows, strict=True))
+        deflections = (y[0] - y) / lengths
+        return _Table(np.log(lengths), deflections, forces, alongs, arcs / lengths, slids / lengths)
 
     def _row(self, pushed: "_Pushed", number: int, wanted: Floats) -> tuple[Floats, ...]:
-        """Return height, forces and arc of one load at the places wanted; nan where none is."""
+        """Return height, forces, arc and what slides of one load; nan where there is none."""
         good = pushed.met[number]
         x = pushed.x[number] + self._depth
         # Pushed so hard near the clamp, a probe that gives way along the fibre may stand behind it.
         run = _longest_rise(x, good & (x > 0.0))
         if run.stop - run.start < 4:
-            return tuple(np.full((4, len(wanted)), math.nan))
+            return tuple(np.full((5, len(wanted)), math.nan))
         x = x[run]
         logs = np.log(x)
         length = np.exp(wanted)
@@ -184,10 +188,11 @@ class Cantilever:
                 pushed.force[number, run] * x**2,
                 pushed.along[number, run] * x**2,
                 pushed.arcs[run] / x,
+                pushed.slids[number, run] / x,
             ]
         )
-        y, force, along, arc = _smooth(logs, known, wanted)
-        values = y, force / self._ei, along / self._ei, arc * length
+        y, force, along, arc, slid = _smooth(logs, known, wanted)
+        values = y, force / self._ei, along / self._ei, arc * length, slid * length
         return tuple(np.where(out, math.nan, each) for each in values)
 
     def _shoot(self, places: Floats, loads: Floats) -> "_Pushed":
@@ -227,6 +232,8 @@ class Cantilever:
             force=felt[0],
             along=along,
             arcs=places,
+            # An edge that rolls does not slide; how the probe gives way is added with the force.
+            slids=places - self._radius * theta - along / self._probe,
             met=(np.abs(missed[0]) < MET_RAD) & (np.abs(theta) < STEEPEST_RAD),
         )
 
@@ -271,6 +278,7 @@ class _Pushed:
     force: Floats
     along: Floats
     arcs: Floats
+    slids: Floats
     met: npt.NDArray[np.bool_]
 
 

@@ -64,9 +64,6 @@ MEASURED_AFTER_S: Final = 1.0
 
 MOST_CREEP: Final = 0.3
 COMPLIANCE_PLACES: Final = 120
-COMPARED_PART: Final = 0.05
-"""Of the length to the probe: a push by which it is told which way the fibre is rubbed."""
-
 MOST_HELD: Final = 0.95
 """Of what it gives way across: friction takes no more of it."""
 
@@ -181,7 +178,7 @@ class Fibre:
         self.grasps = 0
         self.falls = 0
         self._contact = contact
-        self._rubbing = Rubbing(contact.friction_turn_um)
+        self._rubbing = Rubbing(contact.probe_side_un_um, contact.friction_turn_um)
         self._lifting = Lifting()
         self._climate = climate
         self._section = Section(settings, self.key)
@@ -204,6 +201,7 @@ class Fibre:
         self.carried = None
         self._solved = self._inelastic = None
         self._lifting = Lifting()
+        self._rubbing.leave()
 
     def lay(self, pose: PlatePose) -> None:
         """Put it on the plate."""
@@ -363,6 +361,8 @@ class Fibre:
 
     def follow(self, time_s: float, force_un: float, abscissa_um: float) -> None:
         """Take note of the probe's force from now on: it creeps, and may set."""
+        if not force_un:
+            self._rubbing.leave()
         inelastic = self._inelastic
         if inelastic is None and not force_un:
             return
@@ -443,9 +443,11 @@ class Fibre:
         """
         (hold, *more) = self.holds.values()
         if line.free is not None:
-            # What crept stands back: the contact itself does not slide while the probe stands.
-            part = self._rubbing.follow(travel_um + back_um)
             found = self._held_at_one_end(hold, line.free, abscissa_um, probe, time_s)
+            # What crept stands back: the contact itself does not slide while the probe stands.
+            part, sides = 0.0, found.sides(self._lifting.part)
+            if len(sides) > 1:
+                part = self._rubbing.follow(sides[0], sides[-1], travel_um, back_um)
             if found.askew is not None:
                 forces_un = partial(found.forces_un, part)
                 self._lifting.follow(forces_un, travel_um, back_um, height_um, found.askew)
@@ -491,9 +493,6 @@ class Fibre:
                 tuple(each.curve(place, sensor_un_um=spring, stiffer=times) for times in stiffer)
                 for each in solved.cantilevers
             )
-            # Friction takes work: it adds to the push that grows, whichever way that rubs.
-            at_um = COMPARED_PART * self._arm_um(place)
-            curves = tuple(sorted(curves, key=lambda pair: -pair[0].force_un(at_um)))
             self._curves = _Curves(place, curves, askew)
         return self._curves
 
@@ -512,6 +511,7 @@ class Fibre:
 
     def _solve(self, hold: Hold, free: Free, probe: "ProbeShape", ei: float) -> "_Solved":
         friction, section, roll = self._contact.probe_friction, self._section, hold.fate.roll_rad
+        rubbed = (friction, 0.0, -friction) if friction else (0.0,)
         begin, outwards = hold.at_um, hold.outwards
         near = begin + outwards * np.linspace(0.0, 0.5 * free.length_um, 40)
         across, _, _ = section.flexibility(near, roll)
@@ -520,14 +520,14 @@ class Fibre:
             across, _, _ = section.flexibility(begin + outwards * along_um, roll)
             return np.asarray(1.0 / across)
 
-        def cantilever(rubbed: float) -> Cantilever:
+        def cantilever(pulled: float) -> Cantilever:
             return Cantilever(
                 free.abscissas_um,
                 free.asides_um,
                 ei_un_um2=ei,
                 depth_um=hold.depth_um,
                 radius_um=probe.edge_um + self.seen_um / 2.0,
-                friction=rubbed,
+                friction=pulled,
                 turn_rad_un_um=math.radians(self._contact.jaw_turn_deg) * 1e-3,
                 side_un_um=self._contact.jaw_side_un_um,
                 probe_un_um=self._contact.probe_side_un_um,
@@ -540,7 +540,7 @@ class Fibre:
             ei,
             ei / float(across.mean()),
             section.thickness_um(hold.at_um, roll),
-            tuple(cantilever(each) for each in ((friction, -friction) if friction else (0.0,))),
+            tuple(cantilever(each) for each in rubbed),
         )
 
     @property
@@ -576,7 +576,8 @@ class _Curves:
     Attributes
     ----------
     curves : tuple of tuple of PushCurve
-        Of a growing and of a falling push; each with all friction down, then up.
+        With all friction that pulls the fibre outwards, none, and all inwards; each with all
+        friction down, then up.
     """
 
     place_um: float
@@ -594,17 +595,21 @@ class _Curves:
             for each in (self.curves[0], self.curves[-1])
         ]
         per_one, per_other = per_one / most, per_other / most
-        grows, falls = 0.5 + 0.5 * part, 0.5 - 0.5 * part
-        return lambda held: grows / (one + per_one * held) + falls / (other + per_other * held)
+        outer, inner = 0.5 + 0.5 * part, 0.5 - 0.5 * part
+        return lambda held: outer / (one + per_one * held) + inner / (other + per_other * held)
 
     def push(self, part: float, held: float) -> PushCurve | Push:
         """Return the push for friction along the fibre, -1 to 1, and a part of the force up."""
+        sides = self.sides(held)
+        return sides[0] if len(sides) == 1 else RubbedPush(sides[0], sides[1], sides[2], part)
+
+    def sides(self, held: float) -> list[PushCurve | HeldPush]:
+        """Return the pushes with all friction along that pulls outwards, none, all inwards."""
         most = 1.0 if self.askew is None else self.askew.most
-        both = [
+        return [
             each[0] if len(each) == 1 else HeldPush(each[0], each[1], held / most)
             for each in self.curves
         ]
-        return both[0] if len(both) == 1 else RubbedPush(both[0], both[1], part)
 
 
 def _rounded(length_um: float) -> float:

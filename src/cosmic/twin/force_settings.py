@@ -80,7 +80,8 @@ class ContactSettings(StrictModel):
     jaw_side_un_um, jaw_turn_deg : float
         Stiffness of closed jaws across, and by how much 1000 uN um turn a fibre in them.
     probe_friction, friction_turn_um : float
-        Of fibre and probe; and travel over which the friction turns round when the probe does.
+        Of fibre and probe; and by how much the contact itself gives along the fibre while its
+        friction turns round, besides what probe and fibre give: some nm on stiff walls.
     clamp_depth_sigma_ln : float
         Above 0: the depth is lognormal, with `clamp_depth_um` as its median.
     clamp_depth_per_grasp_um : float
@@ -105,7 +106,7 @@ class ContactSettings(StrictModel):
     jaw_side_un_um: float = Field(default=1e9, gt=0.0)
     jaw_turn_deg: float = Field(default=0.0, ge=0.0)
     probe_friction: float = Field(default=0.0, ge=0.0, lt=1.0)
-    friction_turn_um: float = Field(default=0.3, gt=0.0)
+    friction_turn_um: float = Field(default=0.02, gt=0.0)
     clamp_depth_sigma_ln: float = Field(default=0.0, ge=0.0, le=2.0)
     clamp_depth_per_grasp_um: float = Field(default=0.0, ge=0.0)
     probe_side_un_um: float = Field(default=1e9, gt=0.0)

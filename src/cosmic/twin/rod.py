@@ -41,11 +41,13 @@ class PushCurve:
     forces_un : list of float
     alongs_un : list of float
         Force along the fibre on the probe at each, outwards; empty where there is none.
+    slids_um : list of float
+        Where along the fibre the probe touches at each; empty where that is not known.
     reach_um : float
         Way at which the fibre slides off, or the end of what is laid out.
     """
 
-    __slots__ = ("_asked", "alongs_un", "forces_un", "reach_um", "travels_um")
+    __slots__ = ("_asked", "alongs_un", "forces_un", "reach_um", "slids_um", "travels_um")
 
     def __init__(
         self,
@@ -53,6 +55,7 @@ class PushCurve:
         forces_un: Floats,
         sensor_un_um: float,
         alongs_un: Floats | None = None,
+        slids_um: Floats | None = None,
     ) -> None:
         travels = deflections_um + forces_un / sensor_un_um
         rises = travels[1:] > np.maximum.accumulate(travels)[:-1]
@@ -60,9 +63,11 @@ class PushCurve:
             kept = np.concatenate([[True], rises])
             travels, forces_un = travels[kept], forces_un[kept]
             alongs_un = None if alongs_un is None else alongs_un[kept]
+            slids_um = None if slids_um is None else slids_um[kept]
         self.travels_um: list[float] = travels.tolist()
         self.forces_un: list[float] = forces_un.tolist()
         self.alongs_un: list[float] = [] if alongs_un is None else alongs_un.tolist()
+        self.slids_um: list[float] = [] if slids_um is None else slids_um.tolist()
         self.reach_um: float = self.travels_um[-1]
         self._asked = math.nan, (0.0, 0.0)
 
@@ -93,6 +98,23 @@ class PushCurve:
         found = (force, along) if travel_um >= 0.0 else (-force, -along)
         self._asked = travel_um, found
         return found
+
+    def slid_um(self, travel_um: float) -> float:
+        """Return where along the fibre a probe that is stiff along it touches after a travel.
+
+        Of the length from the jaws' tip only what slides counts: a round edge that rolls on the
+        fibre stays where it is. Where the probe gives way by a force along, it touches farther out
+        by so much.
+        """
+        travels, slids = self.travels_um, self.slids_um
+        if not slids or travel_um <= 0.0:
+            return slids[0] if slids else 0.0
+        if travel_um >= self.reach_um:
+            return slids[-1]
+        after = bisect_right(travels, travel_um)
+        low = after - 1
+        part = (travel_um - travels[low]) / (travels[after] - travels[low])
+        return slids[low] + part * (slids[after] - slids[low])
 
 
 @lru_cache(maxsize=128)

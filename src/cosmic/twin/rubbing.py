@@ -12,30 +12,70 @@ from cosmic.twin.rod import PushCurve
 
 ROUNDS: Final = 6
 LEAST_UN: Final = 1e-9
+FARTHEST: Final = 0.5
+"""From the middle between both frictions there is none, at most."""
 
 
 @dataclass(slots=True)
 class Rubbing:
-    """Which way the fibre is rubbed along it, over the travel of the probe.
+    """Friction along the fibre: the contact sticks as long as friction can hold it.
+
+    Where probe and fibre touch would slide as the fibre bends. While it sticks, probe and fibre
+    give way along instead, until that takes all the friction there is. Then it slides, and sticks
+    again as soon as it would slide back.
 
     Attributes
     ----------
+    probe_un_um : float
+        Stiffness of the probe along the fibre.
     turn_um : float
-        Travel over which it turns round: the contact sticks before it slides.
+        By how much the contact itself gives along, from all friction one way to the other.
     part : float
-        1 while the push grows, -1 while it falls, between while the contact sticks.
+        Between all friction there is, 1, which pulls the fibre outwards, and -1, inwards.
     """
 
+    probe_un_um: float
     turn_um: float
     part: float = 0.0
-    _travel_um: float = 0.0
+    _stuck_um: float | None = None
 
-    def follow(self, travel_um: float) -> float:
-        """Take note of where the probe is now, and return `part`."""
-        moved, self._travel_um = travel_um - self._travel_um, travel_um
-        part: float = self.part + 2.0 * moved / self.turn_um
-        self.part = min(max(part, -1.0), 1.0)
-        return self.part
+    def follow(
+        self,
+        outwards: "PushCurve | HeldPush",
+        inwards: "PushCurve | HeldPush",
+        travel_um: float,
+        back_um: float,
+    ) -> float:
+        """Take note of where the probe is now, and return `part`.
+
+        Parameters
+        ----------
+        outwards, inwards : PushCurve or HeldPush
+            With all friction that pulls the fibre outwards, and inwards.
+        back_um : float
+            How far the fibre stands back by what crept: it is bent by so much more.
+        """
+        if travel_um <= 0.0:
+            self.leave()
+            return 0.0
+        if self._stuck_um is None:
+            self._stuck_um = 0.5 * (outwards.slid_um(back_um) + inwards.slid_um(back_um))
+        bent_um = travel_um + back_um
+        least = outwards.slid_um(bent_um) + outwards.along_un(travel_um) / self.probe_un_um
+        most = inwards.slid_um(bent_um) + inwards.along_un(travel_um) / self.probe_un_um
+        middle = 0.5 * (least + most)
+        # Friction always moves a fibre the way that it pulls: below 0 is rounding.
+        gives = 0.5 * (max(most - least, 0.0) + self.turn_um)
+        part = (middle - self._stuck_um) / gives
+        if abs(part) > 1.0:
+            part = math.copysign(1.0, part)
+            self._stuck_um = middle - part * gives
+        self.part = part
+        return part
+
+    def leave(self) -> None:
+        """Take note that they do not touch."""
+        self.part, self._stuck_um = 0.0, None
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,9 +192,9 @@ def given_um_un(down_un: float, up_un: float) -> tuple[float, float]:
     return 0.5 / down_un + 0.5 / up_un, 0.5 / down_un - 0.5 / up_un
 
 
-def rubbed_un(growing_un: float, falling_un: float, part: float) -> float:
-    """Return the force between those of a growing and of a falling push."""
-    return 0.5 * (growing_un + falling_un) + 0.5 * part * (growing_un - falling_un)
+def between(most: float, least: float, part: float) -> float:
+    """Return what lies between that of a part of 1 and that of -1."""
+    return 0.5 * (most + least) + 0.5 * part * (most - least)
 
 
 @dataclass(slots=True)
@@ -190,19 +230,28 @@ class HeldPush(Push):
         across = held_un(one, self.up.force_un(travel_um), self.part)
         return across, across * along / one if one else 0.0
 
+    def slid_um(self, travel_um: float) -> float:
+        """Return where along the fibre the probe touches, as `PushCurve` has it."""
+        return between(self.down.slid_um(travel_um), self.up.slid_um(travel_um), self.part)
+
 
 @dataclass(slots=True)
 class RubbedPush(Push):
-    """A push between a growing and a falling one."""
+    """A push between those with all friction that pulls the fibre outwards, and inwards.
 
-    growing: Push | PushCurve
-    falling: Push | PushCurve
+    Friction moves a soft probe along, nearer to the clamp or farther, and the force across goes
+    with that, not evenly: what it is without friction is between.
+    """
+
+    outwards: Push | PushCurve
+    free: Push | PushCurve
+    inwards: Push | PushCurve
     part: float
 
     @property
     @override
     def reach_um(self) -> float:
-        return min(self.growing.reach_um, self.falling.reach_um)
+        return min(self.outwards.reach_um, self.inwards.reach_um)
 
     @override
     def force_un(self, travel_um: float) -> float:
@@ -214,6 +263,16 @@ class RubbedPush(Push):
 
     @override
     def both_un(self, travel_um: float) -> tuple[float, float]:
-        one, along_one = self.growing.both_un(travel_um)
-        other, along_other = self.falling.both_un(travel_um)
-        return rubbed_un(one, other, self.part), rubbed_un(along_one, along_other, self.part)
+        one, along_one = self.outwards.both_un(travel_um)
+        other, along_other = self.inwards.both_un(travel_um)
+        across, along = (
+            between(one, other, self.part),
+            between(along_one, along_other, self.part),
+        )
+        if abs(self.part) < 1.0 and along_one != along_other:
+            free, along_free = self.free.both_un(travel_um)
+            at = (2.0 * along_free - along_one - along_other) / (along_one - along_other)
+            at = min(max(at, -FARTHEST), FARTHEST)
+            bow = (free - between(one, other, at)) / (1.0 - at * at)
+            across += bow * (1.0 - self.part * self.part)
+        return across, along

@@ -24,6 +24,9 @@ LOADS: Final = 40
 HEAVIEST: Final = 1.3
 """Load in units of EI/lever^2; the deflection reaches 0.4 of the lever."""
 
+RUBS: Final = (1.0, 0.0, -1.0)
+"""Of the friction there may be: what equilibria are sought with."""
+
 ROUNDS: Final = 40
 MET_PART: Final = 1e-6
 """Of the lever: how near the contact must come to the probe."""
@@ -67,10 +70,10 @@ class Balance:
 
     Attributes
     ----------
-    ends_um, contact_rad, off_um, across_um, pushed : ndarray, shape (fibres, probes, 2, LOADS)
+    ends_um, contact_rad, off_um, across_um, pushed : ndarray, shape (fibres, probes, 3, LOADS)
         The length up to the contact, the direction there, how far ahead of the contact the probe
-        is, its place across, and the force across over EI (1/um2); with friction one way and the
-        other.
+        is, its place across, and the force across over EI (1/um2); with friction one way, without
+        any, and the other way.
     """
 
     ends_um: Floats
@@ -154,7 +157,7 @@ def balanced(
         found[:, moving] = rows
         away, turns = np.abs(rows[2]), np.abs(turned - factors).max(axis=0)
         # Each probe is tried until all its loads are met, or none of the rest moves any more.
-        probes, lever = moving // (2 * LOADS), pushes.given[1]
+        probes, lever = moving // (len(RUBS) * LOADS), pushes.given[1]
         unmet = np.bincount(probes[away >= MET_PART * lever], minlength=count) > 0
         on = unmet[probes] & ((away >= STILL_PART * lever) | (turns >= STILL_PART))
         factors = turned
@@ -170,7 +173,7 @@ def _pushes(
 ) -> tuple[_Pushes, Floats, tuple[int, ...]]:
     """Return all loads, where their contacts are sought first, and the shape of `Balance`."""
     gives = np.array([each.gives_um3 for each in fibres], dtype=np.float64)[:, :, None, None]
-    shape = (*gives.shape[:2], 2, LOADS)
+    shape = (*gives.shape[:2], len(RUBS), LOADS)
 
     def spread(values: Floats) -> Floats:
         return np.broadcast_to(values, shape).ravel()
@@ -180,7 +183,7 @@ def _pushes(
 
     levers = of_fibres([each.lever_um for each in fibres])
     loads = np.linspace(0.0, 1.0, LOADS) ** 1.5 * (HEAVIEST / levers**2)
-    rub = math.atan(friction) * np.array([[1.0], [-1.0]])
+    rub = math.atan(friction) * np.array(RUBS)[:, None]
     places = of_fibres([each.at_um for each in fibres])
     given = np.array([spread(each) for each in (places, levers, loads, rub, gives)])
     fibre = np.repeat(np.arange(len(fibres)), given.shape[1] // len(fibres))

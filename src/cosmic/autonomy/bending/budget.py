@@ -60,7 +60,7 @@ def budget_of(
         _line("stiffness along the fibre", Kind.B, variation, "", _root(weights, varied)),
     ]
     stds = np.sqrt(np.diag(common.covariance))
-    units = ("", "", "", "um/uN", "um", "", "", "")
+    units = ("", "", "", "um/uN", "um", "", "", "", "")
     for number, (name, unit) in enumerate(zip(COMMON_SOURCES, units, strict=True)):
         # What goes together is shared among both by its covariance.
         part = float(by[number] * (common.covariance[number] @ by))

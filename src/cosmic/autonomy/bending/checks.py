@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cosmic.autonomy.bending.inference import (
+    FRICTION,
     UNLIKELY,
     VARIATIONS,
     Readings,
@@ -269,8 +270,7 @@ def _notes(
     relaxed, relaxed_std = _mean([(f.relaxation_part, f.relaxation_std_part) for f in used])
     if relaxed - SIGMAS * relaxed_std > RELAXES_FROM:
         notes.add(Quality.RELAXED)
-    rubs, rubs_std = _friction(used, assessed.friction)
-    if rubs - 2.0 * rubs_std > RUBS_FROM:
+    if _rubs(used, assessed) > RUBS_FROM:
         notes.add(Quality.FRICTION)
     return notes
 
@@ -279,6 +279,15 @@ def _mean(values: Sequence[tuple[float, float]]) -> tuple[float, float]:
     weights = np.array([1.0 / max(std, 1e-6) ** 2 for _, std in values])
     means = np.array([value for value, _ in values])
     return float(weights @ means / weights.sum()), float(weights.sum() ** -0.5)
+
+
+def _rubs(fits: Sequence[SpanFit], assessed: Assessed) -> float:
+    """Return friction by all fibres or by this one, less two standard deviations."""
+    common = assessed.common
+    by_all = assessed.friction + float(common.mean[FRICTION])
+    by_all -= 2.0 * math.sqrt(float(common.covariance[FRICTION, FRICTION]))
+    by_own, std = _friction(fits, assessed.friction)
+    return max(by_all, by_own - 2.0 * std)
 
 
 def _friction(fits: Sequence[SpanFit], base: float) -> tuple[float, float]:

@@ -15,7 +15,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.autonomy.bending.balance import LOADS, PushedFibre, balanced
+from cosmic.autonomy.bending.balance import LOADS, RUBS, PushedFibre, balanced
+from cosmic.autonomy.bending.friction import Contact, Ways, pushed_out_and_back, slid_out_and_back
 from cosmic.autonomy.bending.result import BendingError
 from cosmic.frame.arrays import Floats, Mask
 
@@ -188,7 +189,7 @@ class NaturalShape:
     ) -> tuple[PushedCurve, PushedCurve]:
         """Return force over deflection from the first contact on, on the way out and back.
 
-        The probe rubs the way the contact wanders along the fibre.
+        The contact sticks before it slides; it turns back where the curve ends.
 
         Parameters
         ----------
@@ -254,6 +255,71 @@ def _integral(along: Floats, one: Floats, other: Floats) -> float:
 OutAndBack = tuple[PushedCurve, PushedCurve]
 """Of the way out and the way back."""
 
+Curves = tuple[tuple[OutAndBack, ...], ...]
+"""By span and probe."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rubbed:
+    """Several spans, each pushed by several probes, with all friction there may be.
+
+    Attributes
+    ----------
+    contacts : tuple of Contact
+        Of each span and probe, probe by probe; force over EI (1/um2).
+    levers_um : tuple of float
+        Of each span and probe.
+    probes : int
+        Of each span.
+    """
+
+    contacts: tuple[Contact, ...]
+    levers_um: tuple[float, ...]
+    probes: int
+
+    def curves(
+        self, tops_um: Sequence[float] | None = None, *, parts: Sequence[float] = (1.0,)
+    ) -> tuple[Curves, ...]:
+        """Return force over deflection out and back, for parts of the friction there may be.
+
+        Parameters
+        ----------
+        tops_um : sequence of float, optional
+            Travel at which each span turns back; where its curve ends if None.
+        parts : sequence of float
+            Of the friction that the equilibria were sought with.
+        """
+        ways = pushed_out_and_back(self.contacts, self._tops(tops_um), parts)
+        return tuple(self._by_span(each) for each in ways)
+
+    def sliding(
+        self, tops_um: Sequence[float], *, parts: Sequence[float] = (1.0,)
+    ) -> tuple[Curves, ...]:
+        """Return what `curves` does for contacts that never stick."""
+        tops = self._tops(tops_um)
+        each = list(zip(self.contacts, tops, strict=True))
+        return tuple(
+            self._by_span([slid_out_and_back(contact, top, part) for contact, top in each])
+            for part in parts
+        )
+
+    def _tops(self, tops_um: Sequence[float] | None) -> list[float]:
+        ends = [float(each.travel_um[-1]) for each in self.contacts]
+        if tops_um is None:
+            return ends
+        tops = np.repeat(np.asarray(tops_um, dtype=np.float64), self.probes)
+        return [min(*each) for each in zip(tops.tolist(), ends, strict=True)]
+
+    def _by_span(self, ways: Sequence[Ways]) -> Curves:
+        found = [self._curves(n, each) for n, each in enumerate(ways)]
+        return tuple(tuple(found[n : n + self.probes]) for n in range(0, len(found), self.probes))
+
+    def _curves(self, number: int, ways: Ways) -> OutAndBack:
+        lever = self.levers_um[number]
+        deflection = self.contacts[number].travel_um / lever
+        out, back = (PushedCurve(deflection, each * lever**2 / 3.0) for each in ways)
+        return out, back
+
 
 def curves_of(
     pushes: Sequence[tuple[NaturalShape, Sequence[float]]],
@@ -261,48 +327,83 @@ def curves_of(
     depth_um: float,
     radius_um: float,
     friction: float,
-) -> tuple[tuple[OutAndBack, ...], ...]:
+) -> Curves:
     """Return what `NaturalShape.curves` does, for several shapes, each pushed by several probes.
 
     Parameters
     ----------
     pushes : sequence of (NaturalShape, sequence of float)
+        See `rubbed_of`.
+    """
+    if not pushes:
+        return ()
+    found = rubbed_of(pushes, depth_um=depth_um, radius_um=radius_um, friction=friction)
+    return found.curves()[0]
+
+
+def rubbed_of(
+    pushes: Sequence[tuple[NaturalShape, Sequence[float]]],
+    *,
+    depth_um: float,
+    radius_um: float,
+    friction: float,
+) -> Rubbed:
+    """Return what several shapes answer to several probes each, with friction and without.
+
+    Parameters
+    ----------
+    pushes : sequence of (NaturalShape, sequence of float)
         With how far each probe gives way along the jaws for a force of EI times 1/um2, um3; as many
-        probes for each shape.
+        probes for each shape. At least one shape.
 
     Raises
     ------
     BendingError
         A fibre slides off.
     """
-    if not pushes:
-        return ()
     fibres = [shape.pushed_by(gives, depth_um) for shape, gives in pushes]
     found = balanced(fibres, friction=friction, depth_um=depth_um, radius_um=radius_um)
-    wandered = (found.ends_um - radius_um * found.contact_rad).mean(axis=2)
-    inwards = wandered < wandered[..., :1]
-
-    def curve(fibre: int, probe: int, first: int) -> PushedCurve:
-        here = fibre, probe, np.where(inwards[fibre, probe], 1 - first, first), np.arange(LOADS)
-        lever = fibres[fibre].lever_um
+    slid = found.ends_um - radius_um * found.contact_rad
+    probes = len(pushes[0][1])
+    contacts = []
+    for fibre, probe in np.ndindex(len(fibres), probes):
+        here, lever = (fibre, probe), fibres[fibre].lever_um
         met = np.abs(found.off_um[here]) < MET_ENOUGH_PART * lever
-        across, pushed = found.across_um[here], found.pushed[here]
-        return _curve(pushes[fibre][0], across, pushed, met, lever)
-
-    return tuple(
-        tuple((curve(fibre, probe, 0), curve(fibre, probe, 1)) for probe in range(len(gives)))
-        for fibre, (_, gives) in enumerate(pushes)
-    )
+        contacts.append(
+            _contact(pushes[fibre][0], found.across_um[here], found.pushed[here], slid[here], met)
+        )
+    levers = tuple(each.lever_um for each in fibres for _ in range(probes))
+    return Rubbed(tuple(contacts), levers, probes)
 
 
-def _curve(shape: NaturalShape, y: Floats, across: Floats, met: Mask, lever: float) -> PushedCurve:
-    deflection = y[0] - y
+def _contact(
+    shape: NaturalShape, across_um: Floats, pushed: Floats, slid_um: Floats, met: Mask
+) -> Contact:
+    """Return equilibria by the travel, from those by the load; rows by friction."""
+    travel = across_um[:, :1] - across_um
     good = met.copy()
-    good[1:] &= (np.diff(deflection) > 0.0) & (np.diff(across) > 0.0)
-    last = LOADS if good.all() else int(good.argmin())
-    if last < 3:
+    good[:, 1:] &= (np.diff(travel) > 0.0) & (np.diff(pushed) > 0.0)
+    ends = np.where(good.all(axis=1), LOADS, good.argmin(axis=1))
+    if ends.min() < 3:
         raise BendingError(
             f"the fibre lies at {math.degrees(shape.slope_rad):.0f} deg to the jaws at the "
             "probe: it slides off instead of bending; push it nearer to the jaws"
         )
-    return PushedCurve(deflection[:last] / lever, across[:last] * lever**2 / 3.0)
+    without = RUBS.index(0.0)
+    # At the equilibria without friction themselves, for between them curves are straight lines,
+    # and as many places for each fibre.
+    nodes = travel[without, : ends[without]]
+    more = np.linspace(0.0, nodes[-1], LOADS - len(nodes) + 2)[1:-1]
+    at = np.sort(np.concatenate([nodes, more]))
+    rows = [
+        (_straight_on(at, way[:end], force[:end]), _straight_on(at, way[:end], slide[:end]))
+        for way, force, slide, end in zip(travel, pushed, slid_um, ends, strict=True)
+    ]
+    return Contact(at, np.array([each[0] for each in rows]), np.array([each[1] for each in rows]))
+
+
+def _straight_on(at: Floats, nodes: Floats, values: Floats) -> Floats:
+    """Return values between nodes, and beyond the last as between the last two."""
+    over = np.maximum(at - nodes[-1], 0.0)
+    slope = (values[-1] - values[-2]) / (nodes[-1] - nodes[-2])
+    return np.asarray(np.interp(at, nodes, values) + over * slope)

@@ -11,6 +11,7 @@ from cosmic.autonomy.bending.bent_shape import ShapeFit, fitted_shape, turned_in
 from cosmic.autonomy.bending.budget import budget_of
 from cosmic.autonomy.bending.checks import checked
 from cosmic.autonomy.bending.curved import NaturalShape
+from cosmic.autonomy.bending.friction import Rub, known_rub
 from cosmic.autonomy.bending.holds import UNKNOWN_HOLDS, Holds, holds_of
 from cosmic.autonomy.bending.inference import (
     DRIFT,
@@ -46,10 +47,16 @@ from cosmic.frame.units import TWO_SIDED
 
 NEAR: Final = 0.03
 """Of friction: what spans were fitted about stands for so much more and less."""
+NEAR_GIVES: Final = 0.2
+"""The same of what a probe gives way along the fibre, of its logarithm."""
+
 MET_STD_UM: Final = 1.0
 """Of where the probe met the fibre, by the rise of the force."""
+AGAIN: Final = 3
+"""So often a campaign is fitted again at most, until friction stays."""
+
 LEAST_RUB, MOST_RUB = 0.02, 0.8
-"""Friction that curves are laid out for."""
+"""Friction that is looked for."""
 
 FARTHEST_LN: Final = 300.0
 """Of a stiffness: what lies beyond is none."""
@@ -104,6 +111,10 @@ class MeasuredFibre:
         Of a standard.
     holds : Holds
         How far sections of the campaign are held, as far as it is known.
+    friction_std : float or None
+        Of a standard, how well its own friction is known; None: as the settings have it.
+    slides : bool
+        The probe never sticks to it.
     """
 
     spans: tuple[SpanFit, ...]
@@ -114,6 +125,8 @@ class MeasuredFibre:
     part: float = 0.0
     certificate: Certificate | None = None
     holds: Holds = UNKNOWN_HOLDS
+    friction_std: float | None = None
+    slides: bool = False
 
     def at(self, part: float) -> "MeasuredFibre":
         """Return the same, measured when another part of the campaign was over."""
@@ -129,16 +142,30 @@ class MeasuredFibre:
             return replace(self, holds=holds)
         return _read(replace(self, holds=holds), self.readings.response)
 
-    def about(self, friction: float) -> "MeasuredFibre":
-        """Return the same, fitted about another friction."""
+    def about(self, friction: float, *, gives: float = 1.0) -> "MeasuredFibre":
+        """Return the same, fitted about another friction.
+
+        Parameters
+        ----------
+        gives : float
+            How far the probe gives way along it, as a part of what the settings have.
+        """
+        side_un_um = self.settings.side_un_um / gives
         return measure_fibre(
             self.raw,
-            settings=self.settings,
+            settings=self.settings.model_copy(update={"side_un_um": side_un_um}),
             part=self.part,
             certificate=self.certificate,
             friction=friction,
             known=self.readings.response if self.readings is not None else None,
         ).held(self.holds)
+
+    def rubbed(self, *, std: float | None = None, slides: bool) -> "MeasuredFibre":
+        """Return the same, where that is known of its friction."""
+        found = replace(self, friction_std=std, slides=slides)
+        if self.readings is None or (std, slides) == (self.friction_std, self.slides):
+            return found
+        return _read(found, self.readings.response)
 
 
 class Refits:
@@ -149,21 +176,58 @@ class Refits:
     """
 
     def __init__(self) -> None:
-        self._friction = math.nan
+        self._standards: Refits | None = None
+        self._about: Rub | None = None
         self._kept: list[MeasuredFibre] = []
 
+    @property
+    def of_standards(self) -> "Refits":
+        """Those of its standards: glass rubs otherwise."""
+        if self._standards is None:
+            self._standards = Refits()
+        return self._standards
+
+    def as_before(self, fibres: Sequence[MeasuredFibre]) -> tuple[Rub | None, list[MeasuredFibre]]:
+        """Return about what fibres were fitted before, and these fitted about it."""
+        if self._about is None:
+            return None, list(fibres)
+        return self._about, self._fitted(fibres, self._about)
+
     def about(
-        self, fibres: Sequence[MeasuredFibre], friction: float
+        self, fibres: Sequence[MeasuredFibre], friction: float, *, gives: float = 1.0
     ) -> tuple[float, list[MeasuredFibre]]:
-        """Return a friction, this one or one near to it, and the fibres fitted about it."""
-        if not abs(friction - self._friction) <= NEAR:
-            self._friction, self._kept = friction, []
+        """Return a friction, this one or one near to it, and the fibres fitted about it.
+
+        Parameters
+        ----------
+        gives : float
+            See `MeasuredFibre.about`.
+        """
+        wanted = Rub(friction, 0.0, gives)
+        about = self._about
+        if about is None or not _near(about, wanted):
+            about, self._kept = wanted, []
+        self._about = about
+        return about.friction, self._fitted(fibres, about)
+
+    def _fitted(self, fibres: Sequence[MeasuredFibre], about: Rub) -> list[MeasuredFibre]:
         fitted = {id(each.raw): each for each in self._kept}
-        self._kept = [fitted.get(id(each.raw)) or each.about(self._friction) for each in fibres]
-        return self._friction, [
+        self._kept = [
+            fitted.get(id(each.raw)) or each.about(about.friction, gives=about.gives)
+            for each in fibres
+        ]
+        return [
             kept.at(each.part).held(each.holds)
             for kept, each in zip(self._kept, fibres, strict=True)
         ]
+
+
+def _near(one: Rub, other: Rub) -> bool:
+    """Return whether what is fitted about one stands for the other as well."""
+    return (
+        abs(one.friction - other.friction) <= NEAR
+        and abs(math.log(one.gives / other.gives)) <= NEAR_GIVES
+    )
 
 
 def measure_fibre(
@@ -235,6 +299,8 @@ def _read(fibre: MeasuredFibre, response: Response) -> MeasuredFibre:
         direction=direction,
         slipped=any(Quality.SLIPPED in each.flags for each in fibre.spans),
         holds=fibre.holds,
+        friction_std=fibre.friction_std,
+        slides=fibre.slides,
     )
     return replace(fibre, readings=readings)
 
@@ -324,6 +390,9 @@ def assess_campaign(
         fitted again each time.
     """
     settings = settings or FitSettings()
+    refits = refits or Refits()
+    about, fibres, rub = _about_friction(fibres, settings, refits)
+    standards = _about_their_own(standards, about, settings, refits.of_standards)
     alone = tuple(_by_itself(each, settings) for each in standards)
     measured = [
         (each.readings, each.part, () if result.trusted else result.reasons)
@@ -337,21 +406,57 @@ def assess_campaign(
     settings = found.settings
     holds = holds_of([[each.spans[n] for n in each.used] for each in fibres])
     fibres = [each.held(holds) for each in fibres]
-    every = _unsure([*fibres, *(standards[n] for n in found.used)], found.jump_part)
-    verified = bool(found.used)
-    assessed = _assessed(every, settings)
-    rubs = settings.friction + float(assessed.common.mean[FRICTION]) if assessed else 0.0
-    if assessed and abs(rubs - settings.friction) > NEAR:
-        # What friction does is no straight line: it is taken again about where it lies.
-        rubs = min(max(rubs, LEAST_RUB), MOST_RUB)
-        rubs, every = (refits or Refits()).about(every, rubs)
-        every = _unsure(every, found.jump_part)
-        assessed = _assessed(every, settings, friction=rubs)
-    else:
-        rubs = settings.friction
+    used = [standards[n] for n in found.used]
+    verified = bool(used)
+    every = _unsure([*fibres, *used], found.jump_part)
+    assessed = _assessed(every, settings, rub, friction=about)
+    if rub.slides and assessed and abs(float(assessed.common.mean[FRICTION])) > NEAR:
+        # How far the loops are open tells then, and that is no straight line: it is taken again
+        # about where it lies.
+        rubs = min(max(about + float(assessed.common.mean[FRICTION]), LEAST_RUB), MOST_RUB)
+        about, fibres = refits.about(fibres, rubs)
+        fibres = [each.rubbed(slides=True) for each in fibres]
+        every = _unsure([*fibres, *used], found.jump_part)
+        assessed = _assessed(every, settings, rub, friction=about)
     results = _results(every[: len(fibres)], assessed, settings, verified=verified)
     common = assessed.common if assessed else common_prior(settings)
-    return CampaignFit(results, alone, scale_of(common, found, verified=verified), rubs)
+    return CampaignFit(results, alone, scale_of(common, found, verified=verified), about)
+
+
+def _fits_used(fibres: Sequence[MeasuredFibre]) -> list[SpanFit]:
+    return [each.spans[n] for each in fibres for n in each.used]
+
+
+def _about_friction(
+    fibres: Sequence[MeasuredFibre], settings: FitSettings, refits: Refits
+) -> tuple[float, list[MeasuredFibre], Rub]:
+    """Return a friction, fibres fitted about it, and what the shapes of their curves say of it."""
+    before, every = refits.as_before(fibres)
+    about = before or Rub(settings.friction, 0.0)
+    rub = about
+    for _ in range(AGAIN):
+        rub = known_rub(_fits_used(every), settings, gives_log=math.log(about.gives))
+        rub = rub._replace(gives=rub.gives * about.gives)
+        if rub.slides or _near(rub, about):
+            break
+        friction, every = refits.about(fibres, rub.friction, gives=rub.gives)
+        about = rub._replace(friction=friction)
+    return about.friction, [each.rubbed(slides=rub.slides) for each in every], rub
+
+
+def _about_their_own(
+    standards: Sequence[MeasuredFibre], friction: float, settings: FitSettings, refits: Refits
+) -> list[MeasuredFibre]:
+    """Return standards fitted about what they show together: glass rubs otherwise than fibres.
+
+    Where no other friction shows than that of fibres, about that.
+    """
+    rub = known_rub(_fits_used(standards), settings)
+    if abs(rub.friction - friction) <= TWO_SIDED * rub.std:
+        _, every = refits.about(standards, friction)
+    else:
+        _, every, rub = _about_friction(standards, settings, refits)
+    return [each.rubbed(std=rub.std, slides=rub.slides) for each in every]
 
 
 def _results(
@@ -423,10 +528,19 @@ def _by_itself(standard: MeasuredFibre, settings: FitSettings) -> BendingResult:
 
 
 def _assessed(
-    fibres: Sequence[MeasuredFibre], settings: FitSettings, *, friction: float | None = None
+    fibres: Sequence[MeasuredFibre],
+    settings: FitSettings,
+    rub: Rub | None = None,
+    *,
+    friction: float | None = None,
 ) -> Population | None:
+    """Return what they say together, fitted about a friction, where it is known as `rub` says."""
+    slides = rub is not None and rub.slides
+    if rub is not None:
+        known_too = {"friction": rub.friction, "friction_std": rub.std}
+        settings = settings.model_copy(update=known_too)
     known = [each.readings for each in fibres if each.readings is not None]
-    return assess(known, settings, friction=friction) if known else None
+    return assess(known, settings, friction=friction, slides=slides) if known else None
 
 
 def _concluded(

@@ -48,7 +48,7 @@ ALONG: Final = ("friction along, once it let go", "")
 LEAST_STD: Final = 0.004
 """Of ln(k): a model is no better than this."""
 
-GAIN, DRIFT, FRICTION, COMPLIANCE, CONTACT, CROSS, ASIDE, SHEAR = range(len(COMMON_SOURCES))
+GAIN, DRIFT, FRICTION, COMPLIANCE, CONTACT, CROSS, ASIDE, SHEAR, SLIDES = range(len(COMMON_SOURCES))
 
 GLASS_SHEAR: Final = (0.5, 0.1)
 """Of a round beam of glass: `FitSettings.shear_part`, and its standard deviation."""
@@ -74,26 +74,31 @@ class Common:
 
     Attributes
     ----------
-    mean : ndarray, shape (8,), float64
+    mean : ndarray, shape (9,), float64
         In the order of `COMMON_SOURCES`: error of ln(gain), its change over the campaign, friction
         less that about which spans were fitted, compliance of jaws and sensor less the sensor's
         nominal one (um/uN), place of contact (um), the part of a force along the edge that is read
         as one across, how much more than foreseen the probe gives way along the fibre, as a part,
-        and how much more than foreseen fibres shear.
-    covariance : ndarray, shape (8, 8), float64
+        how much more than foreseen fibres shear, and how far the probe slides where it should
+        stick, 1: at once.
+    covariance : ndarray, shape (9, 9), float64
     """
 
     mean: Floats
     covariance: Floats
 
 
-def common_prior(settings: FitSettings, *, friction: float | None = None) -> Common:
+def common_prior(
+    settings: FitSettings, *, friction: float | None = None, slides: bool = False
+) -> Common:
     """Return what is known of the instrument before anything is measured.
 
     Parameters
     ----------
     friction : float, optional
         About which the spans were fitted; that of the settings if None.
+    slides : bool
+        The probe never sticks to fibres.
     """
     rubs = 0.0 if friction is None else settings.friction - friction
     sensor = settings.sensor_std_part / settings.sensor_un_um
@@ -108,9 +113,10 @@ def common_prior(settings: FitSettings, *, friction: float | None = None) -> Com
             settings.cross_std_part,
             settings.side_std_part,
             settings.shear_std_part,
+            settings.slides_std_part,
         ]
     )
-    mean = np.array([0.0, 0.0, rubs, jaws, 0.0, 0.0, 0.0, 0.0])
+    mean = np.array([0.0, 0.0, rubs, jaws, 0.0, 0.0, 0.0, 0.0, float(slides)])
     return Common(mean, np.diag(np.maximum(stds, 1e-9) ** 2))
 
 
@@ -130,7 +136,7 @@ class Readings:
         Their covariance by the scatter of readings.
     span : ndarray, shape (m,), int
         Which span a row belongs to.
-    to_common : ndarray, shape (m, 8), float64
+    to_common : ndarray, shape (m, 9), float64
         Derivatives to what is common.
     own : tuple of (str, str, ndarray, float, float)
         What is each fibre's own beside clamp and variation; see `_Own`.
@@ -166,6 +172,8 @@ def readings_of(
     certified: tuple[float, float] | None = None,
     slipped: bool = False,
     holds: Holds = UNKNOWN_HOLDS,
+    friction_std: float | None = None,
+    slides: bool = False,
 ) -> Readings:
     """Return the readings of the spans of one fibre.
 
@@ -179,8 +187,12 @@ def readings_of(
         Of a standard: ln(EI), EI in uN um2, and its standard uncertainty.
     slipped, holds : bool, Holds
         See `Readings`; and how far sections of the campaign are held.
+    friction_std : float, optional
+        Of a standard, how well its own friction is known; as the settings have it if None.
+    slides : bool
+        The probe never sticks to the fibre.
     """
-    rows = _rows(fits)
+    rows = _rows(fits, slides=slides)
     span = np.array([each.span for each in rows])
     k = np.array([each.k_un_um for each in rows])
     sign = np.array([each.sign for each in rows])
@@ -191,8 +203,13 @@ def readings_of(
     own = (*_own(response, span, settings, direction), shear)
     if glass:
         # Glass rubs and shears otherwise than fibres do.
-        to_common[:, [FRICTION, SHEAR]] = 0.0
-        own = (*own, ("friction", "", friction, 0.0, settings.friction_std))
+        sliding = to_common[:, SLIDES].copy()
+        to_common[:, [FRICTION, SHEAR, SLIDES]] = 0.0
+        own = (
+            *own,
+            ("friction", "", friction, 0.0, friction_std or settings.friction_std),
+            ("the probe slides on glass", "", sliding, float(slides), settings.slides_std_part),
+        )
     # The direction was found as if all contacts lay where they are told to.
     to_common[:, CONTACT] += direction.by_contact * response.by_direction[span]
     same = span[:, None] == span[None, :]
@@ -259,6 +276,7 @@ def _to_common(
             response.slopes[span],
             np.array([_aside(fits[each.span], each.sign) for each in rows]),
             by_shear,
+            np.array([_sliding(fits[each.span], each.sign) for each in rows]),
         ]
     )
 
@@ -340,15 +358,16 @@ class _Row(NamedTuple):
     by_friction: float
 
 
-def _rows(fits: Sequence[SpanFit]) -> list[_Row]:
+def _rows(fits: Sequence[SpanFit], *, slides: bool) -> list[_Row]:
     """Return what was read of each span: on the way out, then on the way back if there is one."""
     rows: list[_Row] = []
     for number, fit in enumerate(fits):
         both = fit.by_friction_both
-        out = both + fit.by_friction
+        out, back = both + fit.by_friction, both - fit.by_friction
+        if slides:
+            out, back = fit.by_friction_sliding
         rows.append(_Row(number, fit.k_loading_un_um, fit.out_std_part, 1.0, out))
         if fit.k_unloading_un_um > 0.0 and math.isfinite(fit.back_std_part):
-            back = both - fit.by_friction
             rows.append(_Row(number, fit.k_unloading_un_um, fit.back_std_part, -1.0, back))
     return rows
 
@@ -386,6 +405,10 @@ def _own(
 
 def _aside(fit: SpanFit, sign: float) -> float:
     return fit.by_side_out if sign > 0.0 else fit.by_side_back
+
+
+def _sliding(fit: SpanFit, sign: float) -> float:
+    return fit.by_sliding_out if sign > 0.0 else fit.by_sliding_back
 
 
 def _longest(response: Response) -> int:

@@ -129,7 +129,11 @@ def variation_weights() -> tuple[Floats, Floats]:
 
 
 def assess(
-    readings: Sequence[Readings], settings: FitSettings, *, friction: float | None = None
+    readings: Sequence[Readings],
+    settings: FitSettings,
+    *,
+    friction: float | None = None,
+    slides: bool = False,
 ) -> Population:
     """Return what the fibres of a campaign, its standards among them, say together.
 
@@ -137,8 +141,10 @@ def assess(
     ----------
     friction : float, optional
         About which the spans were fitted; that of the settings if None.
+    slides : bool
+        The probe never sticks to fibres.
     """
-    prior = common_prior(settings, friction=friction)
+    prior = common_prior(settings, friction=friction, slides=slides)
     known = [prior] * len(readings)
     variations = [_foreseen()] * len(readings)
     common, believed, assessed = prior, prior, []
@@ -326,9 +332,9 @@ class _Said:
 
     Attributes
     ----------
-    precision, pull : ndarray, shapes (8, 8) and (8,)
+    precision, pull : ndarray, shapes (9, 9) and (9,)
         Precision, and precision times mean.
-    by_ei, ei_precision, ei_pull : ndarray, shape (8,), and float
+    by_ei, ei_precision, ei_pull : ndarray, shape (9,), and float
         The same of an error of ln(EI), and what both have to do with each other.
     """
 

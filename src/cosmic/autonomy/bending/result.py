@@ -48,6 +48,7 @@ COMMON_SOURCES: Final = (
     "cross-talk",
     "probe gives way aside",
     "shear",
+    "the probe slides where it should stick",
 )
 """Contributions to the budget that all fibres of a campaign share, in the order of the fit."""
 
@@ -121,11 +122,18 @@ class SpanFit:
     out_std_part, back_std_part, branches_correlation : float
         Standard deviations of ln(k) on the way out and back, and how they go together.
     by_friction : float
-        Change of ln(k) on the way out for a friction of 1; that of the way back is the opposite.
+        Half of what a friction of 1 makes ln(k) of both ways differ by.
     by_friction_both : float
-        Change of ln(k) on both ways for a friction of 1, beside that.
+        Change of ln(k) on both ways alike for a friction of 1, beside that.
     by_side_out, by_side_back : float
         Change of ln(k) by all that the probe is taken to give way along the fibre.
+    by_sliding_out, by_sliding_back : float
+        Change of ln(k) if the probe never stuck to the fibre.
+    by_friction_sliding : (float, float)
+        Change of ln(k) on the ways out and back for a friction of 1, if the probe never stuck.
+    chi2_by_rub : tuple of float
+        `chi2` for each of `friction.SIDES_TRIED` and `friction.RUBS_TRIED`, side by side, and last
+        for a probe that never sticks.
     shift_um, shift_std_um : float
         How much farther out contact ends than it began.
     relaxation_part, relaxation_std_part : float
@@ -161,6 +169,10 @@ class SpanFit:
     by_friction_both: float = 0.0
     by_side_out: float = 0.0
     by_side_back: float = 0.0
+    by_sliding_out: float = 0.0
+    by_sliding_back: float = 0.0
+    by_friction_sliding: tuple[float, float] = (0.0, 0.0)
+    chi2_by_rub: tuple[float, ...] = ()
     shift_um: float = math.nan
     shift_std_um: float = math.nan
     relaxation_part: float = math.nan

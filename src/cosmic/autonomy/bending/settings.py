@@ -41,6 +41,9 @@ class FitSettings(StrictModel):
         How well the place of the first contact across the fibre repeats.
     friction, friction_std : float
         Between probe and fibre.
+    slides_std_part : float
+        How far the probe may slide along the fibre where friction should hold it, as axes that
+        move in steps shake it: 0 sticks, 1 slides at once; one standard deviation.
     askew_std : float
         Part of its compliance that friction takes on the way out, and adds on the way back, from
         a section that stands askew, where no slide showed it: its standard deviation over fibres.
@@ -86,6 +89,7 @@ class FitSettings(StrictModel):
     touch_std_um: float = Field(0.5, gt=0.0)
     friction: float = Field(0.2, ge=0.0, lt=1.0)
     friction_std: float = Field(0.15, ge=0.0)
+    slides_std_part: float = Field(0.5, ge=0.0)
     askew_std: float = Field(0.2, ge=0.0, lt=1.0)
     cross_std_part: float = Field(0.02, ge=0.0)
     relaxation_part: float = Field(0.02, ge=0.0)

@@ -23,8 +23,9 @@ from cosmic.autonomy.bending.branch import (
 )
 from cosmic.autonomy.bending.branch import stuck as clings
 from cosmic.autonomy.bending.crept import Loads, lost
-from cosmic.autonomy.bending.curved import NaturalShape, OutAndBack, PushedCurve, curves_of
+from cosmic.autonomy.bending.curved import NaturalShape, OutAndBack, PushedCurve, rubbed_of
 from cosmic.autonomy.bending.freed import freed_of
+from cosmic.autonomy.bending.friction import LAID_RUB, RUBS_TRIED, SIDES_TRIED
 from cosmic.autonomy.bending.response import straight
 from cosmic.autonomy.bending.result import Quality, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
@@ -49,8 +50,8 @@ BASELINE_STDS: Final = (1000.0, 10.0)
 TYPICAL_PART: Final = 0.6
 """Of the stroke: where curves are compared."""
 
-TURNS_BY: Final = 1.5
-"""So much a cantilever turns at its end, rad, for a deflection as a part of its length."""
+LESS, MORE = 0.7, 1.3
+"""Of the friction that is believed: what curves are compared for."""
 
 TURNING_PART: Final = 0.1
 SLIPPED_PART: Final = 0.03
@@ -88,6 +89,9 @@ class _Found:
     covariance: Floats
     chi2: float
     freedom: int
+    whiten: Floats
+    left: Floats
+    slopes: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,10 +116,78 @@ class _Pushed:
         loads = Loads.of_push(every.time_s, np.maximum(every.force_un - free_un, 0.0))
         return cls(points, shape, first, shape.lever_um(settings.offset_um), loads)
 
-    def gives_um3(self, settings: FitSettings) -> tuple[float, float]:
-        """Return how far the probe gives way along the fibre, and one that does not."""
+    def gives_um3(self, settings: FitSettings) -> list[float]:
+        """Return how far probes give way along the fibre, those of `SIDES_TRIED`."""
         ei_un_um2 = max(self.first.k_un_um, 0.0) * self.lever_um**3 / 3.0
-        return ei_un_um2 / settings.side_un_um, 0.0
+        return [part * ei_un_um2 / settings.side_un_um for part in SIDES_TRIED]
+
+    def top_um(self, settings: FitSettings) -> float:
+        """Return how far the probe has come from the first contact on where it turns back."""
+        highest = float(np.max(self.points.force_un - self.points.free_force_un))
+        come = float(np.max(self.points.probe_um)) - self.first.hinge_um
+        return max(come - highest / settings.sensor_un_um, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Laid:
+    """Curves out and back of one span.
+
+    Attributes
+    ----------
+    sticks, slides : OutAndBack
+        Of a contact that sticks before it slides, and of one that never sticks.
+    less, more, slides_less, slides_more : OutAndBack
+        The same with `LESS` and `MORE` of the friction.
+    stiffer, softer : OutAndBack
+        Of a contact that sticks to probes that give way along the fibre less and more, the first
+        and the last of `SIDES_TRIED`.
+    tried : tuple of OutAndBack
+        Of a contact that sticks, with each of `SIDES_TRIED` and of `RUBS_TRIED`.
+    """
+
+    sticks: OutAndBack
+    slides: OutAndBack
+    less: OutAndBack
+    more: OutAndBack
+    slides_less: OutAndBack
+    slides_more: OutAndBack
+    stiffer: OutAndBack
+    softer: OutAndBack
+    tried: tuple[OutAndBack, ...]
+
+    @classmethod
+    def of(cls, pushes: Sequence[_Pushed], settings: FitSettings, friction: float) -> "list[_Laid]":
+        """Return the curves of each, laid out together."""
+        if not pushes:
+            return []
+        most = max(friction, LAID_RUB)
+        rubbed = rubbed_of(
+            [(each.shape, each.gives_um3(settings)) for each in pushes],
+            depth_um=settings.offset_um,
+            radius_um=settings.radius_um,
+            friction=most,
+        )
+        tops = [each.top_um(settings) for each in pushes]
+        sides = range(len(SIDES_TRIED))
+        nominal = SIDES_TRIED.index(1.0)
+        near = [part * friction / most for part in (1.0, LESS, MORE)]
+        tried = [each / most for each in RUBS_TRIED]
+        sticks = rubbed.curves(tops, parts=[*near, *tried])
+        slides = rubbed.sliding(tops, parts=near)
+        return [
+            cls(
+                sticks=sticks[0][n][nominal],
+                slides=slides[0][n][nominal],
+                less=sticks[1][n][nominal],
+                more=sticks[2][n][nominal],
+                slides_less=slides[1][n][nominal],
+                slides_more=slides[2][n][nominal],
+                stiffer=sticks[0][n][0],
+                softer=sticks[0][n][-1],
+                tried=tuple(each[n][side] for side in sides for each in sticks[len(near) :]),
+            )
+            for n in range(len(pushes))
+        ]
 
 
 class _Model:
@@ -126,7 +198,7 @@ class _Model:
         pushed: _Pushed,
         settings: FitSettings,
         friction: float,
-        curves: tuple[OutAndBack, ...],
+        laid: _Laid,
         others: Loads,
     ) -> None:
         points = self._points = pushed.points
@@ -135,8 +207,7 @@ class _Model:
         self.stroke_part = (
             max(float(np.max(points.probe_um)) - pushed.first.hinge_um, 0.0) / self.length_um
         )
-        self.curves, self.stiff_probe = curves
-        self._shape = pushed.shape
+        self.curves, self._laid = laid.sticks, laid
         self._elapsed_s = points.time_s - points.time_s[0]
         self._lost, self.others = lost(points.time_s), others
         self._lost_of_others_un = others.lost_un(points.time_s)
@@ -146,12 +217,12 @@ class _Model:
         # One point cannot tell stiffness and contact apart: the stiffness is that of the way out.
         self.tied = 0 < clear < LEAST_CLEAR
 
-    def contact(self, values: Floats) -> Floats:
+    def contact(self, values: Floats, curves: OutAndBack | None = None) -> Floats:
         force = np.zeros(len(self._points.probe_um))
         for number, branch in enumerate(self.branches):
             log_k, hinge_um = values[2 * number], values[2 * number + 1]
             ahead = self._points.probe_um[branch] - hinge_um
-            force[branch] = self._force(ahead, log_k, self.curves[number])
+            force[branch] = self._force(ahead, log_k, (curves or self.curves)[number])
         # What has crept stands back from the probe: it is left sooner, and never pulls.
         lost_un = self._lost @ force + self._lost_of_others_un
         left_un = np.maximum(force - values[-1] * lost_un, 0.0)
@@ -186,32 +257,43 @@ class _Model:
         by_value[-3], by_value[-2] = 1.0, self._elapsed_s
         return by_value.T
 
-    def total(self, values: Floats) -> Floats:
-        return np.asarray(self.contact(values) + self.baseline(values), dtype=np.float64)
+    def total(self, values: Floats, curves: OutAndBack | None = None) -> Floats:
+        return np.asarray(self.contact(values, curves) + self.baseline(values), dtype=np.float64)
 
     def baseline(self, values: Floats) -> Floats:
         return np.asarray(values[-3] + values[-2] * self._elapsed_s, dtype=np.float64)
 
-    def by_friction(self) -> float:
-        """Return how ln(k) of the way out changes with friction, half of both ways' difference."""
-        out, back = (self._typical(each) for each in self.curves)
-        rub = self._friction
-        return 0.5 * math.log(out / back) / rub if rub > 0.0 else 0.0
+    def by_friction(self) -> tuple[float, float]:
+        """Return how ln(k) of the ways out and back changes with friction."""
+        return self._by_friction(self._laid.more, self._laid.less)
 
-    def by_friction_both(self) -> float:
-        """Return how ln(k) changes with friction on the way out and back alike."""
-        return self._shape.by_friction_both(
-            self._friction,
-            depth_um=self._settings.offset_um,
-            turned_rad=TURNS_BY * TYPICAL_PART * self.stroke_part,
-        )
+    def by_friction_sliding(self) -> tuple[float, float]:
+        """Return the same where the contact never sticks."""
+        return self._by_friction(self._laid.slides_more, self._laid.slides_less)
+
+    def _by_friction(self, more: OutAndBack, less: OutAndBack) -> tuple[float, float]:
+        if not self._friction > 0.0:
+            return 0.0, 0.0
+        out, back = self._apart(more, less)
+        changed = (MORE - LESS) * self._friction
+        return out / changed, back / changed
 
     def by_side(self) -> tuple[float, float]:
         """Return how ln(k) of the ways out and back changes with what the probe gives way aside.
 
         For all that it is taken to give way.
         """
-        pairs = zip(self.curves, self.stiff_probe, strict=True)
+        out, back = self._apart(self._laid.softer, self._laid.stiffer)
+        apart = SIDES_TRIED[-1] - SIDES_TRIED[0]
+        return out / apart, back / apart
+
+    def by_sliding(self) -> tuple[float, float]:
+        """Return how ln(k) of the ways out and back changes where the contact never sticks."""
+        return self._apart(self._laid.slides, self._laid.sticks)
+
+    def _apart(self, ones: OutAndBack, others: OutAndBack) -> tuple[float, float]:
+        """Return how far ln(k) of two curves is apart, out and back."""
+        pairs = zip(ones, others, strict=True)
         out, back = (math.log(self._typical(one) / self._typical(other)) for one, other in pairs)
         return out, back
 
@@ -219,7 +301,8 @@ class _Model:
         """Return what holds both ways' stiffnesses together, shape (values,)."""
         row = np.zeros(2 * len(self.branches) + 3)
         if self.tied:
-            differ = math.hypot(2.0 * MOST_FRICTION * self.by_friction(), MODEL_PART)
+            out, back = self.by_friction()
+            differ = math.hypot(MOST_FRICTION * (out - back), MODEL_PART)
             row[[0, 2]] = -1.0 / differ, 1.0 / differ
         return row
 
@@ -254,13 +337,29 @@ class _Model:
         walked = self._settings.drift_un_sqrt_s**2 * np.maximum(walk, 0.0)
         return np.asarray(np.diag(single) + walked, dtype=np.float64)
 
+    def chi2_by_rub(self, found: "_Found") -> tuple[float, ...]:
+        """Return what is left with each side and friction tried, and last if it never sticks.
+
+        All else is sought anew, as if forces were straight lines of it.
+        """
+        fitted = self.contact(found.values)
+        basis, _ = np.linalg.qr(found.slopes)
+
+        def left(curves: OutAndBack) -> float:
+            changed = found.left.copy()
+            changed[: len(fitted)] -= found.whiten @ (self.contact(found.values, curves) - fitted)
+            changed -= basis @ (basis.T @ changed)
+            return float(changed @ changed)
+
+        return tuple(left(each) for each in (*self._laid.tried, self._laid.slides))
+
     def _turning(self, values: Floats) -> Floats:
         """Return what is not known while the friction turns round, at the begin of the way back."""
         points, back = self._points, self.branches[1]
         ahead = points.probe_um[back] - values[3]
         both = [
             self._force(ahead, values[2 * branch], curve)
-            for branch, curve in enumerate(self.curves)
+            for branch, curve in enumerate(self._laid.slides)
         ]
         top = float(np.max(points.probe_um))
         stroke = max(top - values[1], 1.0)
@@ -286,7 +385,7 @@ class _Model:
         known[-1] = 1.0 / relaxed_std
         tie = self.tie()
         jacobian = np.eye(len(values))
-        chi2 = 0.0
+        whiten, left, chi2 = jacobian, values, 0.0
         for _ in range(ROUNDS):
             root = np.linalg.cholesky(self.covariance(values))
             whiten = np.asarray(np.linalg.inv(root), dtype=np.float64)
@@ -309,13 +408,13 @@ class _Model:
                 gtol=ENOUGH,
                 maxfev=200,
             )
-            jacobian = slopes(values)
+            jacobian, left = slopes(values), found["fvec"]
             chi2 = float((found["fvec"][:-2] ** 2).sum())
         weak = np.array([*BRANCH_STDS * len(self.branches), *BASELINE_STDS, 1.0]) ** -2.0
         information = jacobian.T @ jacobian + np.diag(weak)
         covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
         freedom = len(points.probe_um) - len(values) + 1 + int(self.tied)
-        return _Found(values, covariance, chi2, freedom)
+        return _Found(values, covariance, chi2, freedom, whiten, left, jacobian)
 
 
 def fit_spans(
@@ -348,12 +447,6 @@ def fit_spans(
         if touched(points, settings.drift_un_sqrt_s)
     }
     rub = settings.friction if friction is None else friction
-    curves = curves_of(
-        [(each.shape, each.gives_um3(settings)) for each in pushed.values()],
-        depth_um=settings.offset_um,
-        radius_um=settings.radius_um,
-        friction=rub,
-    )
     models = {
         number: _Model(
             each,
@@ -365,7 +458,9 @@ def fit_spans(
                 each.lever_um,
             ),
         )
-        for (number, each), laid in zip(pushed.items(), curves, strict=True)
+        for (number, each), laid in zip(
+            pushed.items(), _Laid.of(list(pushed.values()), settings, rub), strict=True
+        )
     }
     return tuple(
         _fitted(span, points, models.get(number), settings, place_um)
@@ -443,7 +538,7 @@ def _span_result(
     weights = np.linalg.pinv(spread) @ np.ones(len(logs))
     std = math.sqrt(1.0 / weights.sum()) if weights.sum() > 0.0 else math.inf
     k = math.exp(min(float(weights @ logs / weights.sum()), HIGHEST_LOG))
-    baseline = model.baseline(values)
+    baseline, by_friction = model.baseline(values), model.by_friction()
     fitted = np.full(len(span.probe_um), math.nan)
     fitted[points.kept] = model.total(values)
     baseline_un = values[-3] + values[-2] * (span.time_s - points.time_s[0])
@@ -472,10 +567,14 @@ def _span_result(
         out_std_part=float(stds[0]),
         back_std_part=float(stds[2]) if both else math.nan,
         branches_correlation=float(covariance[0, 2] / (stds[0] * stds[2])) if both else 0.0,
-        by_friction=model.by_friction(),
-        by_friction_both=model.by_friction_both(),
+        by_friction=0.5 * (by_friction[0] - by_friction[1]),
+        by_friction_both=0.5 * (by_friction[0] + by_friction[1]),
         by_side_out=model.by_side()[0],
         by_side_back=model.by_side()[1],
+        by_friction_sliding=model.by_friction_sliding(),
+        chi2_by_rub=model.chi2_by_rub(found),
+        by_sliding_out=model.by_sliding()[0],
+        by_sliding_back=model.by_sliding()[1],
         shift_um=float(back[1] - out[1]),
         shift_std_um=math.sqrt(shift) if shift > 0.0 else math.nan,
         relaxation_part=float(values[-1]),

@@ -341,7 +341,7 @@ def _contribution(line: Mapping[str, Any]) -> Contribution:
 
 
 def _span_fit(row: Row, fitted_un: Floats) -> SpanFit:
-    numbers = {name: number(row.get(name)) for name in SPAN_NUMBERS}
+    numbers: dict[str, Any] = {name: number(row.get(name)) for name in SPAN_NUMBERS}
     return SpanFit(
         **numbers,
         freedom=int(row["freedom"] or 0),
