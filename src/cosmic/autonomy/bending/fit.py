@@ -335,8 +335,7 @@ def assess_campaign(
         for each, result, reading in zip(standards, alone, found.readings, strict=True)
     )
     settings = found.settings
-    holds = holds_of([[each.spans[n] for n in each.used] for each in fibres])
-    fibres = [each.held(holds) for each in fibres]
+    fibres = _held(fibres, settings.friction)
     every = _unsure([*fibres, *(standards[n] for n in found.used)], found.jump_part)
     verified = bool(found.used)
     assessed = _assessed(every, settings)
@@ -345,6 +344,7 @@ def assess_campaign(
         # What friction does is no straight line: it is taken again about where it lies.
         rubs = min(max(rubs, LEAST_RUB), MOST_RUB)
         rubs, every = (refits or Refits()).about(every, rubs)
+        every = [*_held(every[: len(fibres)], rubs), *every[len(fibres) :]]
         every = _unsure(every, found.jump_part)
         assessed = _assessed(every, settings, friction=rubs)
     else:
@@ -352,6 +352,12 @@ def assess_campaign(
     results = _results(every[: len(fibres)], assessed, settings, verified=verified)
     common = assessed.common if assessed else common_prior(settings)
     return CampaignFit(results, alone, scale_of(common, found, verified=verified), rubs)
+
+
+def _held(fibres: Sequence[MeasuredFibre], friction: float) -> list[MeasuredFibre]:
+    """Return the same, held as their slides say together."""
+    holds = holds_of([[each.spans[n] for n in each.used] for each in fibres], friction)
+    return [each.held(holds) for each in fibres]
 
 
 def _results(

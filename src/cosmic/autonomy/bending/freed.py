@@ -19,6 +19,11 @@ UNKNOWN: Final = (math.nan, math.nan)
 READ_S: Final = 0.1
 """About so long after its step the force before was read."""
 
+STANDS_PART: Final = 0.6
+"""How still axes stand that hold their place, by how well one comes back to it. In a slide the jaws
+go up and down alone: across neither they nor the probe move, and piezo stages at rest wander by 5
+to 20 nm each, beside 50 nm to which they are taken to come back."""
+
 LEAST_PART: Final = 0.1
 """Of the force: what is less than this afterwards has lost the probe."""
 
@@ -44,8 +49,8 @@ def freed_of(
     others : Loads
         Of other spans, from which the fibre still comes back.
     stage_std_un : float
-        What the force is off where the probe is as far off its place as its stages repeat: a slide
-        does not bring it back any better, and a short span is pushed by little.
+        What the force is off where the probe is as far off its place as its stages repeat; it does
+        not move in a slide, and stands the stiller for that.
     """
     freed = span.freed
     if freed is None or not 0 <= freed.after < len(span.force_un):
@@ -63,5 +68,6 @@ def freed_of(
     fell = relaxation_part * math.log10(1.0 + freed.wait_s / READ_S)
     came_back = relaxation_part * float(-np.diff(others.lost_un(read_s))[0]) / before
     after = 2.0 / (1.0 / up + 1.0 / down)
-    std = math.hypot(noise / before, stage_std_un / before, 0.5 * fell, 0.5 * came_back)
+    stands_un = STANDS_PART * stage_std_un
+    std = math.hypot(noise / before, stands_un / before, 0.5 * fell, 0.5 * came_back)
     return math.log(after / before) + fell - came_back, std

@@ -43,7 +43,7 @@ def widths(holds: list[float], monkeypatch: pytest.MonkeyPatch) -> tuple[float, 
     fibres = [slid(seed, held) for seed, held in enumerate(holds)]
     together = assess_campaign(fibres).fibres
     with monkeypatch.context() as patched:
-        patched.setattr(fit, "holds_of", lambda _: UNKNOWN_HOLDS)
+        patched.setattr(fit, "holds_of", lambda *_: UNKNOWN_HOLDS)
         alone = assess_campaign(fibres).fibres
     found = [statistics.median(half_width_percent(each) for each in of) for of in (alone, together)]
     return found[0], found[1]
@@ -51,7 +51,7 @@ def widths(holds: list[float], monkeypatch: pytest.MonkeyPatch) -> tuple[float, 
 
 def test_where_no_fibre_is_held_little_is_believed_of_the_next() -> None:
     fibres = [slid(seed, 0.0) for seed in range(FIBRES)]
-    holds = holds_of([each.spans for each in fibres])
+    holds = holds_of([each.spans for each in fibres], 0.2)
     assert abs(holds.mean) < 0.02
     assert holds.std < 0.03
     assert holds.twisted < 0.02
@@ -60,7 +60,7 @@ def test_where_no_fibre_is_held_little_is_believed_of_the_next() -> None:
 def test_fibres_that_are_held_very_differently_teach_nothing_of_the_next() -> None:
     parts = [0.0, 0.25, 0.02, 0.12, 0.05, 0.2, 0.0, 0.08]
     fibres = [slid(seed, held) for seed, held in enumerate(parts)]
-    holds = holds_of([each.spans for each in fibres])
+    holds = holds_of([each.spans for each in fibres], 0.2)
     assert holds.std > 0.06
     found = assess_campaign(fibres).fibres
     free = [assess_campaign([slid(seed, 0.0)]).fibres[0] for seed in range(FIBRES)]
@@ -78,10 +78,10 @@ def test_intervals_are_narrower_by_it_only_where_fibres_are_alike(
 
 
 def test_one_fibre_shows_nothing_of_others() -> None:
-    assert holds_of([slid(1, 0.1).spans]) == UNKNOWN_HOLDS
-    assert holds_of([]) == UNKNOWN_HOLDS
+    assert holds_of([slid(1, 0.1).spans], 0.2) == UNKNOWN_HOLDS
+    assert holds_of([], 0.2) == UNKNOWN_HOLDS
     never = [measure_fibre(pushed(rig(n)), settings=FitSettings()).spans for n in range(3)]
-    assert holds_of(never) == UNKNOWN_HOLDS
+    assert holds_of(never, 0.2) == UNKNOWN_HOLDS
 
 
 @pytest.mark.parametrize("noise_times", [0.2, 5.0])
@@ -93,7 +93,7 @@ def test_holds_are_found_whatever_the_noise_is_taken_to_be(noise_times: float) -
         ]
         for seed in range(FIBRES)
     ]
-    holds = holds_of(fibres)
+    holds = holds_of(fibres, 0.2)
     assert holds.mean == pytest.approx(math.log(0.9), abs=0.03)
     assert math.isfinite(holds.std)
 
