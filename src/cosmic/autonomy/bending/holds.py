@@ -88,7 +88,7 @@ def holds_of(fibres: Sequence[Sequence[SpanFit]], friction: float) -> Holds:
     friction : float
         Between probe and fibres.
     """
-    slides = [found for each in fibres if len((found := slides_of(each)).logs)]
+    slides = [shown for each in fibres if len((shown := slides_of(each)).logs)]
     if len(slides) < FEWEST:
         return UNKNOWN_HOLDS
     along, along_std = _along(slides, friction)

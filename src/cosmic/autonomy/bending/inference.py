@@ -311,7 +311,12 @@ def _held(fits: Sequence[SpanFit], holds: Holds) -> tuple[Floats, Floats]:
     before = alike + np.diag(np.full(len(fits), twisted**2))
     gain = np.linalg.solve(before[np.ix_(known, known)] + np.diag(slides.stds**2), before[known]).T
     logs = holds.mean + gain @ (freed - holds.mean)
-    return np.asarray(logs), np.asarray(before - gain @ before[known])
+    of_span = before - gain @ before[known]
+    if not math.isfinite(holds.std):
+        # Nothing but the way back would speak against what all spans of a fibre have in common, and
+        # that is no better: alone it counts as if each had its own.
+        of_span = np.diag(np.diag(of_span))
+    return np.asarray(logs), np.asarray(of_span)
 
 
 def _between(values: Floats, weights: Floats) -> float:
