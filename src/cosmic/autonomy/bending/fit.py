@@ -392,7 +392,9 @@ def assess_campaign(
     settings = settings or FitSettings()
     refits = refits or Refits()
     about, fibres, rub = _about_friction(fibres, settings, refits)
-    standards = _about_their_own(standards, about, settings, refits.of_standards)
+    standards = _about_their_own(
+        standards, rub._replace(friction=about), settings, refits.of_standards
+    )
     alone = tuple(_by_itself(each, settings) for each in standards)
     measured = [
         (each.readings, each.part, () if result.trusted else result.reasons)
@@ -404,19 +406,18 @@ def assess_campaign(
         for each, result, reading in zip(standards, alone, found.readings, strict=True)
     )
     settings = found.settings
-    holds = holds_of([[each.spans[n] for n in each.used] for each in fibres])
-    fibres = [each.held(holds) for each in fibres]
-    used = [standards[n] for n in found.used]
-    verified = bool(used)
-    every = _unsure([*fibres, *used], found.jump_part)
+    fibres = _held(fibres)
+    verified = bool(found.used)
+    every = _unsure([*fibres, *(standards[n] for n in found.used)], found.jump_part)
     assessed = _assessed(every, settings, rub, friction=about)
     if rub.slides and assessed and abs(float(assessed.common.mean[FRICTION])) > NEAR:
         # How far the loops are open tells then, and that is no straight line: it is taken again
         # about where it lies.
         rubs = min(max(about + float(assessed.common.mean[FRICTION]), LEAST_RUB), MOST_RUB)
-        about, fibres = refits.about(fibres, rubs)
-        fibres = [each.rubbed(slides=True) for each in fibres]
-        every = _unsure([*fibres, *used], found.jump_part)
+        about, every = refits.about(every, rubs)
+        every = [each.rubbed(slides=True) for each in every]
+        every = [*_held(every[: len(fibres)]), *every[len(fibres) :]]
+        every = _unsure(every, found.jump_part)
         assessed = _assessed(every, settings, rub, friction=about)
     results = _results(every[: len(fibres)], assessed, settings, verified=verified)
     common = assessed.common if assessed else common_prior(settings)
@@ -445,18 +446,26 @@ def _about_friction(
 
 
 def _about_their_own(
-    standards: Sequence[MeasuredFibre], friction: float, settings: FitSettings, refits: Refits
+    standards: Sequence[MeasuredFibre], like: Rub, settings: FitSettings, refits: Refits
 ) -> list[MeasuredFibre]:
     """Return standards fitted about what they show together: glass rubs otherwise than fibres.
 
     Where no other friction shows than that of fibres, about that.
     """
+    if like.slides:
+        return [each.rubbed(slides=True) for each in standards]
     rub = known_rub(_fits_used(standards), settings)
-    if abs(rub.friction - friction) <= TWO_SIDED * rub.std:
-        _, every = refits.about(standards, friction)
+    if abs(rub.friction - like.friction) <= TWO_SIDED * rub.std:
+        _, every = refits.about(standards, like.friction)
     else:
         _, every, rub = _about_friction(standards, settings, refits)
     return [each.rubbed(std=rub.std, slides=rub.slides) for each in every]
+
+
+def _held(fibres: Sequence[MeasuredFibre]) -> list[MeasuredFibre]:
+    """Return the same, held as their slides say together."""
+    holds = holds_of([[each.spans[n] for n in each.used] for each in fibres])
+    return [each.held(holds) for each in fibres]
 
 
 def _results(

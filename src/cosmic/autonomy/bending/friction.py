@@ -170,6 +170,8 @@ def known_rub(fits: Sequence[SpanFit], settings: FitSettings, *, gives_log: floa
             # What does not fit with any friction says little about it.
             excess = max(1.0, float(chi2.min()) / max(each.freedom, 1))
             logs += np.logaddexp(-0.5 * (chi2 - chi2.min()) / excess, MISLEADS)
+    if not logs.any():
+        return Rub(settings.friction, settings.friction_std)
     sticks = logs[:-1].reshape(len(SIDES_TRIED), len(RUBS_TRIED))
     if max(sticks[:, 0].max(), logs[-1]) >= sticks[:, 1:].max():
         # What hardly sticks and what never does look alike: how far loops are open tells then.

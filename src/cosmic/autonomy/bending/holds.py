@@ -2,25 +2,28 @@
 
 A slide tells of one fibre how much too stiff it is on the way out, to a few per cent. What those of
 a campaign show tells how far such holds lie apart: where friction is small they all are nothing,
-and a slide of one more fibre then tells of its noise.
+and a slide of one more fibre then tells of its noise; and how unlike the spans of a fibre are. It
+also tells whether the friction along the fibre lets go with a slide: that goes by its slope, from
+span to span, and where it does, not one fibre keeps the force that it had.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from cosmic.autonomy.bending.result import SpanFit
 from cosmic.frame.arrays import Floats
 
 TWISTED: Final = 0.25
-"""Of what friction does to a section askew: the part that differs between spans, by twist; it may
-be seen to differ by more."""
+"""Of what friction does to a section askew: the part that differs between spans, by twist, of a
+fibre of which no others are known."""
 
 TWISTED_LEAST: Final = 0.015
-"""The same at least, of ln(k), of a fibre of which no others are known."""
+"""The same at least, of ln(k)."""
 
 LEAST_STD: Final = 0.004
 """Of ln(k): no slide tells more."""
@@ -30,8 +33,15 @@ FARTHEST: Final = 0.1
 
 SPREADS: Final = np.array([0.003, 0.01, 0.03, 0.06, 0.12, 0.2])
 TWISTS: Final = np.array([0.003, 0.006, 0.01, 0.015, 0.03])
-"""Of ln(k): standard deviations between fibres, and between the spans of one beside its part of the
-hold; those that are weighed, all as likely beforehand."""
+PARTS: Final = np.array([0.03, 0.06, 0.12, 0.25, 0.5])
+"""Of ln(k): standard deviations between fibres, and between the spans of one, by itself and as a
+part of the hold; those that are weighed, all as likely beforehand."""
+
+LET_GO: Final = np.linspace(0.0, 1.0, 11)
+LET_GO_STD: Final = 0.5
+"""Of friction along the fibre: parts that may let go with a slide, those that are weighed, and how
+far they lie from nothing beforehand. A contact that slides up is not rubbed along; one that crept
+back, or stuck on the way, is again."""
 
 FEWEST: Final = 2
 """Fibres from which something is learned of the next."""
@@ -45,40 +55,64 @@ class Holds:
     ----------
     mean, std : float
         ln of the force once friction was made to let go by that before, over fibres.
-    twisted : float
-        How far that of a span lies from that of its fibre, beside `TWISTED` of it.
+    twisted, twisted_part : float
+        How far that of a span lies from that of its fibre, by itself and as a part of it.
+    along, along_std : float
+        Friction along the fibre that lets go with a slide.
     """
 
     mean: float = 0.0
     std: float = math.inf
     twisted: float = TWISTED_LEAST
+    twisted_part: float = TWISTED
+    along: float = 0.0
+    along_std: float = math.inf
 
 
 UNKNOWN_HOLDS: Final = Holds()
 
 
+class Slides(NamedTuple):
+    """What the slides of a fibre showed, standard deviations, and what friction along does."""
+
+    logs: Floats
+    stds: Floats
+    by_friction: Floats
+
+
 def holds_of(fibres: Sequence[Sequence[SpanFit]]) -> Holds:
     """Return what the slides of the spans of these fibres say."""
-    slides = [found for each in fibres if len((found := slides_of(each))[0])]
+    slides = [shown for each in fibres if len((shown := slides_of(each)).logs)]
     if len(slides) < FEWEST:
         return UNKNOWN_HOLDS
-    likely = np.array([sum(_of_twist(*each, twist)[2] for each in slides) for twist in TWISTS])
-    twisted = math.sqrt(float(_weights(likely) @ TWISTS**2))
-    seen = [_of_twist(*each, twisted) for each in slides]
-    means, variances = np.array([each[0] for each in seen]), np.array([each[1] for each in seen])
-    spread = [_of_spread(means, variances, each) for each in SPREADS]
+    friction = max(fit.friction for each in fibres for fit in each)
+    along, along_std = _along(slides, friction)
+    found = _twists_of(slides, along)
+    spread = [_of_spread(found.means, found.variances, each) for each in SPREADS]
     middles, errors = np.array([each[0] for each in spread]), np.array([each[1] for each in spread])
     weights = _weights(np.array([each[2] for each in spread]))
     mean = float(weights @ middles)
-    return Holds(mean, math.sqrt(float(weights @ (errors + (middles - mean) ** 2))), twisted)
+    std = math.sqrt(float(weights @ (errors + (middles - mean) ** 2)))
+    return Holds(mean, std, found.twisted, found.part, along, along_std)
 
 
-def slides_of(fits: Sequence[SpanFit]) -> tuple[Floats, Floats]:
-    """Return what the slides of a fibre showed, and the standard deviations of that."""
+def _along(slides: Sequence[Slides], friction: float) -> tuple[float, float]:
+    """Return how much of the friction along let go, and the standard deviation of that."""
+    likely = np.array([_twists_of(slides, part * friction).log_likelihood for part in LET_GO])
+    weights = _weights(likely - 0.5 * (LET_GO / LET_GO_STD) ** 2)
+    part = float(weights @ LET_GO)
+    # As well as the steps between those that are weighed tell it.
+    variance = float(weights @ (LET_GO - part) ** 2) + (LET_GO[1] - LET_GO[0]) ** 2 / 12.0
+    return friction * part, friction * math.sqrt(variance)
+
+
+def slides_of(fits: Sequence[SpanFit]) -> Slides:
+    """Return what the slides of a fibre showed."""
     logs = np.array([each.freed_log for each in fits], dtype=np.float64)
     stds = np.array([each.freed_std_part for each in fits], dtype=np.float64)
+    rubbed = np.array([each.by_friction_both + each.by_friction for each in fits], dtype=np.float64)
     known = np.isfinite(logs) & np.isfinite(stds)
-    return logs[known], np.maximum(stds[known], LEAST_STD)
+    return Slides(logs[known], np.maximum(stds[known], LEAST_STD), rubbed[known])
 
 
 def _weights(log_likelihood: Floats) -> Floats:
@@ -86,11 +120,42 @@ def _weights(log_likelihood: Floats) -> Floats:
     return np.asarray(likely / likely.sum())
 
 
-def _of_twist(logs: Floats, stds: Floats, twist: float) -> tuple[float, float, float]:
+class _Twists(NamedTuple):
+    """How far spans differ, mean and variance of each fibre, and how likely all of it is."""
+
+    twisted: float
+    part: float
+    means: Floats
+    variances: Floats
+    log_likelihood: float
+
+
+def _twists_of(slides: Sequence[Slides], along: float) -> _Twists:
+    """Return what the slides say where so much friction along let go with them."""
+    freed = [(each.logs + along * each.by_friction, each.stds) for each in slides]
+    grid = [(part, twist) for part in PARTS for twist in TWISTS]
+    likely = np.array([sum(_of_twist(*each, *pair)[2] for each in freed) for pair in grid])
+    part, twisted = (float(each) for each in _weights(likely) @ np.array(grid))
+    seen = [_of_twist(*each, part, twisted) for each in freed]
+    means, variances = np.array([each[0] for each in seen]), np.array([each[1] for each in seen])
+    held = np.array([_held_down(means, variances, each) for each in SPREADS])
+    total = float(np.logaddexp.reduce(likely) + np.logaddexp.reduce(held))
+    return _Twists(twisted, part, means, variances, total)
+
+
+def _held_down(means: Floats, variances: Floats, spread: float) -> float:
+    """Return ln of how likely holds are that lie so far from nothing: none makes a fibre softer."""
+    every = variances + spread**2
+    sigmas = -means * spread / np.sqrt(variances * every)
+    each = -0.5 * (means**2 / every + np.log(every)) + log_ndtr(sigmas)
+    return float(each.sum())
+
+
+def _of_twist(logs: Floats, stds: Floats, part: float, twist: float) -> tuple[float, float, float]:
     """Return mean of a fibre, variance of that, and ln of how likely its spans lie so far apart."""
     plain = stds**-2.0
-    part = TWISTED * float(plain @ logs) / float(plain.sum())
-    variances = stds**2 + part**2 + twist**2
+    differs = part * float(plain @ logs) / float(plain.sum())
+    variances = stds**2 + differs**2 + twist**2
     precision = float((1.0 / variances).sum())
     mean = float((logs / variances).sum()) / precision
     apart = float(((logs - mean) ** 2 / variances).sum())

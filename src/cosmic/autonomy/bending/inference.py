@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.special import chdtrc, ndtr
 
-from cosmic.autonomy.bending.holds import TWISTED, UNKNOWN_HOLDS, Holds
+from cosmic.autonomy.bending.holds import TWISTED, UNKNOWN_HOLDS, Holds, slides_of
 from cosmic.autonomy.bending.response import Direction, LaidOut, Response
 from cosmic.autonomy.bending.result import COMMON_SOURCES, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
@@ -42,6 +42,10 @@ TURNED_PART: Final = 1.0
 TURNED_LEAST: Final = 0.01
 """How far friction that holds a section askew may have turned round on the way back, as a part of
 what it did on the way out; and at least, of ln(k), beside how well that is known."""
+
+ANY_HOLD: Final = 1.0
+"""Of ln(k): how much friction may hold a fibre, one standard deviation, of which others tell
+nothing."""
 
 ALONG: Final = ("friction along, once it let go", "")
 
@@ -217,7 +221,8 @@ def readings_of(
     if freed is not None:
         shift, askew = freed
         # The friction along the fibre may have let go as well.
-        own = (*own, (*ALONG, np.where(sign > 0.0, friction, 0.0), 0.0, 0.5 * settings.friction))
+        std = holds.along_std if math.isfinite(holds.along_std) else 0.5 * settings.friction
+        own = (*own, (*ALONG, np.where(sign > 0.0, friction, 0.0), 0.0, std))
     else:
         shift = -_between_branches(span, np.log(k))
         askew = np.zeros_like(same, dtype=float) if glass else _askew(sign, same, settings)
@@ -293,33 +298,43 @@ def _freed(
     """Return what is to be added to ln(k), and its covariance; None: friction never let go.
 
     On the way out a section askew was as much too stiff as the force fell once friction let go, and
-    as in the other spans, but for twist, and as in the other fibres as far as those are alike: each
-    counts by how well it is known. On the way back it may have turned round, by any part of that:
-    how far depends on the section.
+    as in the other spans, but for twist, and as in the other fibres as far as those are alike. What
+    is not known of all spans together tells nothing of the clamp. On the way back it may have
+    turned round, by any part of that: how far depends on the section.
     """
-    logs = np.array([each.freed_log for each in fits])
-    stds = np.array([each.freed_std_part for each in fits])
-    known = np.isfinite(logs) & np.isfinite(stds)
-    if not known.any():
+    slides = slides_of(fits)
+    if not len(slides.logs):
         return None
-    weights = 1.0 / np.maximum(stds[known], LEAST_STD) ** 2
-    precision = float(weights.sum()) + holds.std**-2.0
-    mean = (float(weights @ logs[known]) + holds.mean * holds.std**-2.0) / precision
-    seen = _between(logs[known], weights)
-    twisted = math.hypot(TWISTED * mean, holds.twisted, seen)
-    # A slide of a short span tells little: it is taken together with what the others show.
-    by_others = math.hypot(twisted, precision**-0.5)
-    own = np.where(known, by_others**2 / (by_others**2 + np.where(known, stds, 0.0) ** 2), 0.0)
-    logs = mean + own * np.where(known, logs - mean, 0.0)
-    stds = by_others * np.sqrt(1.0 - own)
+    logs, of_span = _held(fits, holds)
     span = np.array([each.span for each in rows])
     out = np.array([each.sign > 0.0 for each in rows])
-    of_out = np.diag(stds[span] ** 2) * np.outer(out, out)
+    of_out = of_span[span[:, None], span] * np.outer(out, out)
     same = span[:, None] == span[None, :]
-    most = np.hypot(TURNED_PART * np.hypot(logs, stds), TURNED_LEAST)
+    most = np.hypot(TURNED_PART * np.hypot(logs, np.sqrt(np.diag(of_span))), TURNED_LEAST)
     turned = np.where(out, 0.0, most[span])
     back = np.outer(turned, turned) * (0.5 + 0.5 * same)
     return logs[span] * out, np.asarray(of_out + back)
+
+
+def _held(fits: Sequence[SpanFit], holds: Holds) -> tuple[Floats, Floats]:
+    """Return how much friction holds each span, as ln of the force, and its covariance."""
+    known = np.array([math.isfinite(fit.freed_log + fit.freed_std_part) for fit in fits])
+    slides = slides_of(fits)
+    freed, weights = slides.logs + holds.along * slides.by_friction, slides.stds**-2.0
+    precision = float(weights.sum()) + holds.std**-2.0
+    mean = (float(weights @ freed) + holds.mean * holds.std**-2.0) / precision
+    twisted = math.hypot(holds.twisted_part * mean, holds.twisted)
+    twisted = max(twisted, _between(freed, weights))
+    alike = min(holds.std, ANY_HOLD) ** 2
+    before = alike + np.diag(np.full(len(fits), twisted**2))
+    gain = np.linalg.solve(before[np.ix_(known, known)] + np.diag(slides.stds**2), before[known]).T
+    logs = holds.mean + gain @ (freed - holds.mean)
+    of_span = before - gain @ before[known]
+    if not math.isfinite(holds.std):
+        # Nothing but the way back would speak against what all spans of a fibre have in common, and
+        # that is no better: alone it counts as if each had its own.
+        of_span = np.diag(np.diag(of_span))
+    return np.asarray(logs), np.asarray(of_span)
 
 
 def _between(values: Floats, weights: Floats) -> float:

@@ -34,8 +34,10 @@ from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.frame.arrays import Floats
 
 MIDDLES: Final = 13
-SPREADS: Final = np.array([0.15, 0.3, 0.45, 0.65, 0.9])
-"""Of ln(depth) between fibres, as a part of what is not known beforehand."""
+SPREADS: Final = np.array([0.2, 0.3, 0.45, 0.65, 0.9])
+"""Of ln(depth) between fibres, as a part of what is not known beforehand: a sixth at least, by size
+all as likely. In jaws that give way the depth goes by the fourth root of EI over the stiffness of
+the wall across, and fibres of which one is twice as stiff as the other differ by so much."""
 
 REACH: Final = 2.5
 MIDDLE_PART: Final = 0.8
@@ -105,7 +107,7 @@ def depth_weights(settings: FitSettings, depths_um: Floats) -> tuple[Floats, Flo
             each = np.exp(-0.5 * ((logs - middle - away) / (part * spread)) ** 2)
             total = float(each.sum())
             if total > 0.0:
-                priors.append(weight)
+                priors.append(weight * part)
                 weights.append(each / total)
     prior = np.array(priors)
     return prior / prior.sum(), np.array(weights)

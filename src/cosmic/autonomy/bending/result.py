@@ -121,6 +121,8 @@ class SpanFit:
     flags : frozenset of Quality
     out_std_part, back_std_part, branches_correlation : float
         Standard deviations of ln(k) on the way out and back, and how they go together.
+    friction : float
+        About which it was fitted.
     by_friction : float
         Half of what a friction of 1 makes ln(k) of both ways differ by.
     by_friction_both : float
@@ -165,6 +167,7 @@ class SpanFit:
     out_std_part: float = math.nan
     back_std_part: float = math.nan
     branches_correlation: float = 0.0
+    friction: float = 0.0
     by_friction: float = 0.0
     by_friction_both: float = 0.0
     by_side_out: float = 0.0

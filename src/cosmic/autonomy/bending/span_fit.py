@@ -202,7 +202,7 @@ class _Model:
         others: Loads,
     ) -> None:
         points = self._points = pushed.points
-        self._settings, self._friction = settings, friction
+        self._settings, self.friction = settings, friction
         self._first, self.length_um = pushed.first, pushed.lever_um
         self.stroke_part = (
             max(float(np.max(points.probe_um)) - pushed.first.hinge_um, 0.0) / self.length_um
@@ -272,10 +272,10 @@ class _Model:
         return self._by_friction(self._laid.slides_more, self._laid.slides_less)
 
     def _by_friction(self, more: OutAndBack, less: OutAndBack) -> tuple[float, float]:
-        if not self._friction > 0.0:
+        if not self.friction > 0.0:
             return 0.0, 0.0
         out, back = self._apart(more, less)
-        changed = (MORE - LESS) * self._friction
+        changed = (MORE - LESS) * self.friction
         return out / changed, back / changed
 
     def by_side(self) -> tuple[float, float]:
@@ -567,6 +567,7 @@ def _span_result(
         out_std_part=float(stds[0]),
         back_std_part=float(stds[2]) if both else math.nan,
         branches_correlation=float(covariance[0, 2] / (stds[0] * stds[2])) if both else 0.0,
+        friction=model.friction,
         by_friction=0.5 * (by_friction[0] - by_friction[1]),
         by_friction_both=0.5 * (by_friction[0] + by_friction[1]),
         by_side_out=model.by_side()[0],

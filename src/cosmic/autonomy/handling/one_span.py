@@ -57,6 +57,9 @@ SLIDE_WELL_TIMES: Final = 4.0
 SLIDE_PART: Final = 0.5
 """Of the push, and of the highest force: a fibre is pressed by no more to be slid, for friction
 bends it up or down beside."""
+DEEP_PART: Final = 0.5
+"""Of a push: where the last step of the search may have led so far into it, it is begun again from
+without contact, or too few readings would be left to tell how stiff the fibre is."""
 COARSE_PART: Final = 0.25
 """Of a push: its steps where the fibre should have been felt already."""
 CLOSE_PART: Final = 0.2
@@ -315,6 +318,8 @@ class OneSpan:
         push, fibre = self._push, self._fibre
         wanted = push.slide_um > 0.0 and not (fibre.standard or fibre.slid_off)
         if not wanted or len(fibre.spans) % push.slide_every:
+            if self._points.probe_um[-1] - free_um > DEEP_PART * self._plan.stroke_um:
+                yield from self._to(free_um - CLEAR_UM, push.search_average_s, loading=True)
             return
         # Begun from without contact, as the push is.
         clear_um = free_um - CLEAR_UM

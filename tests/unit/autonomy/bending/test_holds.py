@@ -14,8 +14,9 @@ from cosmic.autonomy.bending.fit import (
     half_width_percent,
     measure_fibre,
 )
-from cosmic.autonomy.bending.holds import UNKNOWN_HOLDS, holds_of
-from cosmic.autonomy.bending.inference import FRICTION
+from cosmic.autonomy.bending.holds import UNKNOWN_HOLDS, Holds, holds_of
+from cosmic.autonomy.bending.inference import FRICTION, _held
+from cosmic.autonomy.bending.result import SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Freed
 from unit.autonomy.bending.test_fit_bending import pushed, rig
@@ -23,6 +24,7 @@ from unit.autonomy.bending.test_freed import AFTER, LEVEL_UN
 
 NOISE = 0.06
 FIBRES = 8
+SPANS = measure_fibre(pushed(rig(0)), settings=FitSettings()).spans
 
 
 def slid(seed: int, held: float) -> MeasuredFibre:
@@ -111,3 +113,50 @@ def test_of_many_fibres_no_more_is_learned_than_of_so_many(monkeypatch: pytest.M
     all_count, few_count = known(FIBRES), known(2)
     assert few_count > 1.2 * all_count
     assert few_count < FitSettings().friction_std
+
+
+def shown(held: float, *, along: float = 0.0, differs: float = 0.0, seed: int = 0) -> list[SpanFit]:
+    """Return spans of which slides tell to a per cent how far each is held, and let go along."""
+    random = np.random.default_rng(seed)
+    return [
+        dataclasses.replace(
+            each,
+            friction=0.3,
+            by_friction=rubbed,
+            by_friction_both=0.0,
+            freed_log=held * (1.0 + random.normal(0.0, differs))
+            - along * rubbed
+            + random.normal(0.0, 0.01),
+            freed_std_part=0.01,
+        )
+        for each, rubbed in zip(SPANS, (0.1, 0.2, 0.3, 0.4, 0.5), strict=True)
+    ]
+
+
+@pytest.mark.parametrize(("differs", "low", "high"), [(0.03, 0.0, 0.09), (0.4, 0.22, 0.5)])
+def test_how_unlike_spans_of_a_fibre_are_held_is_learned_from_all(
+    differs: float, low: float, high: float
+) -> None:
+    helds = [-0.1, -0.3, -0.2, -0.15, -0.25, -0.3, -0.2, -0.1]
+    holds = holds_of([shown(h, differs=differs, seed=n) for n, h in enumerate(helds)])
+    assert low < holds.twisted_part < high
+
+
+@pytest.mark.parametrize("part", [0.0, 1.0])
+def test_whether_friction_along_lets_go_is_learned_from_slides(part: float) -> None:
+    helds = [0.0, -0.3, 0.0, -0.15, -0.05, -0.3, -0.2, -0.1]
+    fibres = [shown(h, along=part * 0.3, seed=n) for n, h in enumerate(helds)]
+    holds = holds_of(fibres)
+    assert holds.along == pytest.approx(part * 0.3, abs=0.08)
+    assert holds.along_std < 0.06
+    free = holds_of([[dataclasses.replace(fit, friction=0.0) for fit in each] for each in fibres])
+    assert free.along == free.along_std == 0.0
+
+
+def test_what_all_spans_have_in_common_is_not_known_better_by_more_of_them() -> None:
+    few, many = (
+        _held(shown(-0.2)[:count], Holds(std=1.0, twisted=0.0, twisted_part=0.0))[1]
+        for count in (2, 5)
+    )
+    assert few[0, 1] == pytest.approx(few[0, 0], rel=1e-3)
+    assert many[0, 4] == pytest.approx(0.01**2 / 5.0, rel=1e-2)
