@@ -3,8 +3,8 @@
 A generator of measurements that knows nothing of the analysis, nor of the twin. For a load and a
 length the rod is marched from the contact, where nothing bends it, back to the clamp, and the whole
 is then turned so that it leaves the clamp as it must: nothing is sought but the length that brings
-the probe to where it stands. Clamp, probe and sensor give way, the fibre relaxes, yields, is weak in
-places and shears; the instrument has a wrong scale, drifts and plays. The probe rubs: as long as
+the probe to where it stands. Clamp, probe and sensor give way, the fibre relaxes, yields, is weak
+in places and shears; the instrument has a wrong scale, drifts and plays. The probe rubs: as long as
 friction can hold it, it goes along with the place of the fibre that it touches.
 
 A fibre's true stiffness is the flexural rigidity averaged over its longest span as compliance
@@ -276,14 +276,19 @@ def curves(fibre: Fibre, places_um: Floats, **rig: float) -> tuple[Floats, Float
     Of a probe that slides at once. And where it first touches, (places,).
     """
     found = balance(fibre, places_um, **rig)
-    # Which way the probe rubs on its way out is where the contact wanders along the fibre.
-    ends = found.slid[:, [0, 2]]
-    wanders = (ends.mean(axis=1) - ends.mean(axis=1)[:, :1])[:, None, :] < 0.0
-    travel, across, along = (
-        np.where(wanders, values[:, [2, 0]], values[:, [0, 2]])
-        for values in (found.travel, found.across, found.along)
-    )
+    travel, across, along = sliding(found)
     return travel, across, along, found.touch
+
+
+def sliding(found: Balance) -> list[Floats]:
+    """Return travel, force across and force along, out and back, of a probe that slides at once."""
+    # Which way the probe rubs on its way out is where the contact wanders along the fibre.
+    both = found.slid[..., [0, 2], :].mean(axis=-2)
+    wanders = (both - both[..., :1])[..., None, :] < 0.0
+    return [
+        np.where(wanders, values[..., [2, 0], :], values[..., [0, 2], :])
+        for values in (found.travel, found.across, found.along)
+    ]
 
 
 def balance(
@@ -432,19 +437,16 @@ def rubbed(at: Balance, press: Floats) -> tuple[Floats, Floats]:
 
 def slid_at_once(at: Balance, press: Floats, loading: Floats) -> tuple[Floats, Floats]:
     """Return the same of a probe that slides at once, and turns round over a part of the way."""
-    first = 0 if at.slid[1].mean() > at.slid[1, 0] else 2
-    if at.slid[0].mean() > at.slid[2].mean():
-        first = 2 - first
-
-    def of(state: int, values: Floats) -> Floats:
-        return np.interp(press, at.travel[state], values[state], left=0.0)
-
+    travel, *forces = sliding(at)
     gone = np.where(loading, 0.0, np.maximum(press.max() - press, 0.0)) / press.max()
-    out = np.exp(-gone / BLEND_PART)
-    return tuple(
-        out * of(first, values) + (1.0 - out) * of(2 - first, values)
-        for values in (at.across, at.along)
-    )
+    stays = np.exp(-gone / BLEND_PART)
+
+    def felt(values: Floats) -> Floats:
+        out, back = (np.interp(press, travel[n], values[n], left=0.0) for n in range(2))
+        return stays * out + (1.0 - stays) * back
+
+    across, along = (felt(values) for values in forces)
+    return across, along
 
 
 def _push(

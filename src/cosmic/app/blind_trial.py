@@ -10,7 +10,7 @@ import json
 import math
 import subprocess
 import sys
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -138,7 +138,7 @@ def sealed_program() -> Path:
     raise TrialError("the program of sealed sessions is not installed: name one with --sealed-by")
 
 
-UNSEEN: Final = {"shear_part": 0.8, "shear_std_part": 0.9}
+UNSEEN: Final[Mapping[str, Any]] = {"shear_part": 0.8, "shear_std_part": 0.9}
 """Of fibres that no image shows: how wide they are is not known, and shear goes by that:
 of some 12 um, with E/G up to 35."""
 

@@ -47,6 +47,9 @@ from cosmic.frame.units import TWO_SIDED
 
 NEAR: Final = 0.03
 """Of friction: what spans were fitted about stands for so much more and less."""
+NEAR_SLIDING: Final = 0.06
+"""The same where contacts never stick: forces are nearly straight lines of it then."""
+
 NEAR_GIVES: Final = 0.2
 """The same of what a probe gives way along the fibre, of its logarithm."""
 
@@ -142,23 +145,28 @@ class MeasuredFibre:
             return replace(self, holds=holds)
         return _read(replace(self, holds=holds), self.readings.response)
 
-    def about(self, friction: float, *, gives: float = 1.0) -> "MeasuredFibre":
+    def about(
+        self, friction: float, *, gives: float = 1.0, slides: bool = False
+    ) -> "MeasuredFibre":
         """Return the same, fitted about another friction.
 
         Parameters
         ----------
         gives : float
             How far the probe gives way along it, as a part of what the settings have.
+        slides : bool
+            The probe never sticks to it.
         """
-        side_un_um = self.settings.side_un_um / gives
-        return measure_fibre(
+        changed = {"side_un_um": self.settings.side_un_um / gives, "slides": slides}
+        found = measure_fibre(
             self.raw,
-            settings=self.settings.model_copy(update={"side_un_um": side_un_um}),
+            settings=self.settings.model_copy(update=changed),
             part=self.part,
             certificate=self.certificate,
             friction=friction,
             known=self.readings.response if self.readings is not None else None,
-        ).held(self.holds)
+        )
+        return found.held(self.holds).rubbed(slides=slides)
 
     def rubbed(self, *, std: float | None = None, slides: bool) -> "MeasuredFibre":
         """Return the same, where that is known of its friction."""
@@ -178,7 +186,7 @@ class Refits:
     def __init__(self) -> None:
         self._standards: Refits | None = None
         self._about: Rub | None = None
-        self._kept: list[MeasuredFibre] = []
+        self._kept: dict[int, MeasuredFibre] = {}
 
     @property
     def of_standards(self) -> "Refits":
@@ -194,38 +202,41 @@ class Refits:
         return self._about, self._fitted(fibres, self._about)
 
     def about(
-        self, fibres: Sequence[MeasuredFibre], friction: float, *, gives: float = 1.0
+        self,
+        fibres: Sequence[MeasuredFibre],
+        friction: float,
+        *,
+        gives: float = 1.0,
+        slides: bool = False,
     ) -> tuple[float, list[MeasuredFibre]]:
         """Return a friction, this one or one near to it, and the fibres fitted about it.
 
         Parameters
         ----------
-        gives : float
+        gives, slides : float, bool
             See `MeasuredFibre.about`.
         """
-        wanted = Rub(friction, 0.0, gives)
+        wanted = Rub(friction, 0.0, gives, slides)
         about = self._about
         if about is None or not _near(about, wanted):
-            about, self._kept = wanted, []
+            about, self._kept = wanted, {}
         self._about = about
         return about.friction, self._fitted(fibres, about)
 
     def _fitted(self, fibres: Sequence[MeasuredFibre], about: Rub) -> list[MeasuredFibre]:
-        fitted = {id(each.raw): each for each in self._kept}
-        self._kept = [
-            fitted.get(id(each.raw)) or each.about(about.friction, gives=about.gives)
-            for each in fibres
-        ]
-        return [
-            kept.at(each.part).held(each.holds)
-            for kept, each in zip(self._kept, fibres, strict=True)
-        ]
+        for each in fibres:
+            if id(each.raw) not in self._kept:
+                self._kept[id(each.raw)] = each.about(
+                    about.friction, gives=about.gives, slides=about.slides
+                )
+        return [self._kept[id(each.raw)].at(each.part).held(each.holds) for each in fibres]
 
 
 def _near(one: Rub, other: Rub) -> bool:
     """Return whether what is fitted about one stands for the other as well."""
     return (
-        abs(one.friction - other.friction) <= NEAR
+        abs(one.friction - other.friction) <= (NEAR_SLIDING if one.slides else NEAR)
+        and one.slides == other.slides
         and abs(math.log(one.gives / other.gives)) <= NEAR_GIVES
     )
 
@@ -410,12 +421,11 @@ def assess_campaign(
     verified = bool(found.used)
     every = _unsure([*fibres, *(standards[n] for n in found.used)], found.jump_part)
     assessed = _assessed(every, settings, rub, friction=about)
-    if rub.slides and assessed and abs(float(assessed.common.mean[FRICTION])) > NEAR:
+    if rub.slides and assessed:
         # How far the loops are open tells then, and that is no straight line: it is taken again
         # about where it lies.
         rubs = min(max(about + float(assessed.common.mean[FRICTION]), LEAST_RUB), MOST_RUB)
-        about, every = refits.about(every, rubs)
-        every = [each.rubbed(slides=True) for each in every]
+        about, every = refits.about(every, rubs, slides=True)
         every = [*_held(every[: len(fibres)]), *every[len(fibres) :]]
         every = _unsure(every, found.jump_part)
         assessed = _assessed(every, settings, rub, friction=about)
@@ -424,19 +434,24 @@ def assess_campaign(
     return CampaignFit(results, alone, scale_of(common, found, verified=verified), about)
 
 
-def _fits_used(fibres: Sequence[MeasuredFibre]) -> list[SpanFit]:
-    return [each.spans[n] for each in fibres for n in each.used]
+def _fits_of(fibres: Sequence[MeasuredFibre]) -> list[SpanFit]:
+    return [fit for each in fibres for fit in each.spans]
 
 
 def _about_friction(
-    fibres: Sequence[MeasuredFibre], settings: FitSettings, refits: Refits
+    fibres: Sequence[MeasuredFibre],
+    settings: FitSettings,
+    refits: Refits,
+    *,
+    may_slide: bool = True,
 ) -> tuple[float, list[MeasuredFibre], Rub]:
     """Return a friction, fibres fitted about it, and what the shapes of their curves say of it."""
     before, every = refits.as_before(fibres)
     about = before or Rub(settings.friction, 0.0)
     rub = about
     for _ in range(AGAIN):
-        rub = known_rub(_fits_used(every), settings, gives_log=math.log(about.gives))
+        gave = math.log(about.gives)
+        rub = known_rub(_fits_of(every), settings, gives_log=gave, may_slide=may_slide)
         rub = rub._replace(gives=rub.gives * about.gives)
         if rub.slides or _near(rub, about):
             break
@@ -454,12 +469,13 @@ def _about_their_own(
     """
     if like.slides:
         return [each.rubbed(slides=True) for each in standards]
-    rub = known_rub(_fits_used(standards), settings)
+    # Whether contacts stick the fibres tell better.
+    rub = known_rub(_fits_of(standards), settings, may_slide=False)
     if abs(rub.friction - like.friction) <= TWO_SIDED * rub.std:
         _, every = refits.about(standards, like.friction)
     else:
-        _, every, rub = _about_friction(standards, settings, refits)
-    return [each.rubbed(std=rub.std, slides=rub.slides) for each in every]
+        _, every, rub = _about_friction(standards, settings, refits, may_slide=False)
+    return [each.rubbed(std=rub.std, slides=False) for each in every]
 
 
 def _held(fibres: Sequence[MeasuredFibre]) -> list[MeasuredFibre]:
@@ -544,7 +560,8 @@ def _assessed(
     friction: float | None = None,
 ) -> Population | None:
     """Return what they say together, fitted about a friction, where it is known as `rub` says."""
-    slides = rub is not None and rub.slides
+    laid_sliding = all(each.settings.slides for each in fibres if each.certificate is None)
+    slides = rub is not None and rub.slides and not laid_sliding
     if rub is not None:
         known_too = {"friction": rub.friction, "friction_std": rub.std}
         settings = settings.model_copy(update=known_too)

@@ -68,6 +68,15 @@ class Rub(NamedTuple):
     slides: bool = False
 
 
+HARDLY: Final = 3
+"""Of `RUBS_TRIED`: with less than this the friction turns round on so short a way that it may well
+slide at once."""
+
+STICKS_BY: Final = 2.0
+"""Of a logarithm: so much more likely a contact that hardly sticks must be than one that never
+does, to be believed."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
     """What one span does with friction one way, without any, and with friction the other way.
@@ -152,7 +161,13 @@ def _at(values: Floats, part: Floats | float) -> Floats:
     return np.asarray(none + part * (0.5 * (ahead - back) + part * (0.5 * (ahead + back) - none)))
 
 
-def known_rub(fits: Sequence[SpanFit], settings: FitSettings, *, gives_log: float = 0.0) -> Rub:
+def known_rub(
+    fits: Sequence[SpanFit],
+    settings: FitSettings,
+    *,
+    gives_log: float = 0.0,
+    may_slide: bool = True,
+) -> Rub:
     """Return what the shapes of curves say of friction, beside what is known beforehand.
 
     The travel on which friction turns round grows with it, and with what the probe gives way: that
@@ -162,6 +177,8 @@ def known_rub(fits: Sequence[SpanFit], settings: FitSettings, *, gives_log: floa
     ----------
     gives_log : float
         By how much more than the settings have it the probe gave way where these were fitted, ln.
+    may_slide : bool
+        Contacts that never stick are looked for as well.
     """
     logs = np.zeros(len(SIDES_TRIED) * len(RUBS_TRIED) + 1)
     for each in fits:
@@ -173,7 +190,11 @@ def known_rub(fits: Sequence[SpanFit], settings: FitSettings, *, gives_log: floa
     if not logs.any():
         return Rub(settings.friction, settings.friction_std)
     sticks = logs[:-1].reshape(len(SIDES_TRIED), len(RUBS_TRIED))
-    if max(sticks[:, 0].max(), logs[-1]) >= sticks[:, 1:].max():
+    likely = sticks.max(axis=0)
+    best = int(likely.argmax())
+    if may_slide and max(likely[0], logs[-1]) > likely[best] - (
+        STICKS_BY if best < HARDLY else 0.0
+    ):
         # What hardly sticks and what never does look alike: how far loops are open tells then.
         return Rub(settings.friction, settings.friction_std, slides=True)
     from scipy.interpolate import PchipInterpolator  # half a second, at the first fit

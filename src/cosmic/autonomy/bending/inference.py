@@ -207,12 +207,14 @@ def readings_of(
     own = (*_own(response, span, settings, direction), shear)
     if glass:
         # Glass rubs and shears otherwise than fibres do.
-        sliding = to_common[:, SLIDES].copy()
+        sliding, other = to_common[:, SLIDES].copy(), float(slides and not settings.slides)
+        # Where it slides, how much friction there is tells of all.
+        slides_std = 0.0 if slides else settings.slides_std_part
         to_common[:, [FRICTION, SHEAR, SLIDES]] = 0.0
         own = (
             *own,
             ("friction", "", friction, 0.0, friction_std or settings.friction_std),
-            ("the probe slides on glass", "", sliding, float(slides), settings.slides_std_part),
+            ("the probe slides on glass", "", sliding, other, slides_std),
         )
     # The direction was found as if all contacts lay where they are told to.
     to_common[:, CONTACT] += direction.by_contact * response.by_direction[span]

@@ -41,6 +41,8 @@ class FitSettings(StrictModel):
         How well the place of the first contact across the fibre repeats.
     friction, friction_std : float
         Between probe and fibre.
+    slides : bool
+        The probe never sticks to fibres, whatever friction could hold; a campaign finds out.
     slides_std_part : float
         How far the probe may slide along the fibre where friction should hold it, as axes that
         move in steps shake it: 0 sticks, 1 slides at once; one standard deviation.
@@ -89,7 +91,8 @@ class FitSettings(StrictModel):
     touch_std_um: float = Field(0.5, gt=0.0)
     friction: float = Field(0.2, ge=0.0, lt=1.0)
     friction_std: float = Field(0.15, ge=0.0)
-    slides_std_part: float = Field(0.5, ge=0.0)
+    slides: bool = False
+    slides_std_part: float = Field(0.1, ge=0.0)
     askew_std: float = Field(0.2, ge=0.0, lt=1.0)
     cross_std_part: float = Field(0.02, ge=0.0)
     relaxation_part: float = Field(0.02, ge=0.0)

@@ -207,7 +207,7 @@ class _Model:
         self.stroke_part = (
             max(float(np.max(points.probe_um)) - pushed.first.hinge_um, 0.0) / self.length_um
         )
-        self.curves, self._laid = laid.sticks, laid
+        self.curves, self._laid = laid.slides if settings.slides else laid.sticks, laid
         self._elapsed_s = points.time_s - points.time_s[0]
         self._lost, self.others = lost(points.time_s), others
         self._lost_of_others_un = others.lost_un(points.time_s)
