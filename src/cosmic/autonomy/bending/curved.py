@@ -16,7 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.autonomy.bending.balance import LOADS, RUBS, PushedFibre, balanced
-from cosmic.autonomy.bending.friction import Contact, Ways, pushed_out_and_back, slid_out_and_back
+from cosmic.autonomy.bending.friction import (
+    Branches,
+    Contact,
+    pushed_out_and_back,
+    slid_out_and_back,
+)
 from cosmic.autonomy.bending.result import BendingError
 from cosmic.frame.arrays import Floats, Mask
 
@@ -289,8 +294,10 @@ class Rubbed:
         parts : sequence of float
             Of the friction that the equilibria were sought with.
         """
-        ways = pushed_out_and_back(self.contacts, self._tops(tops_um), parts)
-        return tuple(self._by_span(each) for each in ways)
+        tops = self._tops(tops_um)
+        contacts = [each.with_top(top) for each, top in zip(self.contacts, tops, strict=True)]
+        branches = pushed_out_and_back(contacts, tops, parts)
+        return tuple(self._by_span(contacts, each) for each in branches)
 
     def sliding(
         self, tops_um: Sequence[float], *, parts: Sequence[float] = (1.0,)
@@ -299,7 +306,9 @@ class Rubbed:
         tops = self._tops(tops_um)
         each = list(zip(self.contacts, tops, strict=True))
         return tuple(
-            self._by_span([slid_out_and_back(contact, top, part) for contact, top in each])
+            self._by_span(
+                self.contacts, [slid_out_and_back(contact, top, part) for contact, top in each]
+            )
             for part in parts
         )
 
@@ -310,15 +319,17 @@ class Rubbed:
         tops = np.repeat(np.asarray(tops_um, dtype=np.float64), self.probes)
         return [min(*each) for each in zip(tops.tolist(), ends, strict=True)]
 
-    def _by_span(self, ways: Sequence[Ways]) -> Curves:
-        found = [self._curves(n, each) for n, each in enumerate(ways)]
+    def _by_span(self, contacts: Sequence[Contact], branches: Sequence[Branches]) -> Curves:
+        every = zip(contacts, self.levers_um, branches, strict=True)
+        found = [
+            _curves(each.travel_um / lever, lever, out_back) for each, lever, out_back in every
+        ]
         return tuple(tuple(found[n : n + self.probes]) for n in range(0, len(found), self.probes))
 
-    def _curves(self, number: int, ways: Ways) -> OutAndBack:
-        lever = self.levers_um[number]
-        deflection = self.contacts[number].travel_um / lever
-        out, back = (PushedCurve(deflection, each * lever**2 / 3.0) for each in ways)
-        return out, back
+
+def _curves(deflection: Floats, lever_um: float, branches: Branches) -> OutAndBack:
+    out, back = (PushedCurve(deflection, each * lever_um**2 / 3.0) for each in branches)
+    return out, back
 
 
 def curves_of(
@@ -396,8 +407,8 @@ def _contact(
     more = np.linspace(0.0, nodes[-1], LOADS - len(nodes) + 2)[1:-1]
     at = np.sort(np.concatenate([nodes, more]))
     rows = [
-        (_straight_on(at, way[:end], force[:end]), _straight_on(at, way[:end], slide[:end]))
-        for way, force, slide, end in zip(travel, pushed, slid_um, ends, strict=True)
+        (_straight_on(at, gone[:end], force[:end]), _straight_on(at, gone[:end], slide[:end]))
+        for gone, force, slide, end in zip(travel, pushed, slid_um, ends, strict=True)
     ]
     return Contact(at, np.array([each[0] for each in rows]), np.array([each[1] for each in rows]))
 

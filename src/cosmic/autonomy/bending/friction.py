@@ -77,6 +77,10 @@ STICKS_BY: Final = 2.0
 does, to be believed."""
 
 
+BEFORE_TOP: Final = (0.94, 0.97, 0.985, 0.995, 1.0)
+"""Of the travel at which a push turns back: friction may turn round on a very short way."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
     """What one span does with friction one way, without any, and with friction the other way.
@@ -93,14 +97,23 @@ class Contact:
     pushed: Floats
     slid_um: Floats
 
+    def with_top(self, top_um: float) -> "Contact":
+        """Return the same at more travels, those where a push turns back among them."""
+        travel = np.sort(np.concatenate([self.travel_um, top_um * np.array(BEFORE_TOP)]))
+        pushed, slid = (
+            np.array([np.interp(travel, self.travel_um, each) for each in rows])
+            for rows in (self.pushed, self.slid_um)
+        )
+        return Contact(travel, pushed, slid)
 
-Ways = tuple[Floats, Floats]
+
+Branches = tuple[Floats, Floats]
 """Force across on the way out and on the way back, at each travel."""
 
 
 def pushed_out_and_back(
     contacts: Sequence[Contact], tops_um: Sequence[float], parts: Sequence[float]
-) -> tuple[tuple[Ways, ...], ...]:
+) -> tuple[tuple[Branches, ...], ...]:
     """Return what each contact answers for each part of the friction.
 
     Parameters
@@ -108,7 +121,7 @@ def pushed_out_and_back(
     contacts : sequence of Contact
         All with as many travels.
     tops_um : sequence of float
-        Travel at which each turns back; beyond, both ways are one.
+        Travel at which each turns back, one of its own; beyond, both ways are one.
     parts : sequence of float
         Of the friction that the contacts were found with: so much is there.
     """
@@ -125,17 +138,18 @@ def pushed_out_and_back(
         out[load] = _held(slid[:, load], stays, most)
         stays = stayed[load] = _at(slid[:, load], out[load])
     back = out.copy()
-    stays = np.array([np.interp(tops[n], travel[:, n], stayed[:, n]) for n in range(len(tops))])
+    top = np.argmax(travel >= tops, axis=0)
+    stays = stayed[top, np.arange(len(tops))]
     for load in range(loads - 1, 0, -1):
         below = travel[load] < tops
         back[load] = np.where(below, _held(slid[:, load], stays, most), out[load])
         stays = np.where(below, _at(slid[:, load], back[load]), stays)
-    ways = list(zip(_at(pushed, out).T, _at(pushed, back).T, strict=True))
+    branches = list(zip(_at(pushed, out).T, _at(pushed, back).T, strict=True))
     count = len(contacts)
-    return tuple(tuple(ways[n : n + count]) for n in range(0, len(ways), count))
+    return tuple(tuple(branches[n : n + count]) for n in range(0, len(branches), count))
 
 
-def slid_out_and_back(contact: Contact, top_um: float, part: float) -> Ways:
+def slid_out_and_back(contact: Contact, top_um: float, part: float) -> Branches:
     """Return what `pushed_out_and_back` does for a contact that never sticks."""
     ahead, none, back = (np.interp(top_um, contact.travel_um, each) for each in contact.slid_um)
     # Friction of the way out holds the contact back from where it would wander.
