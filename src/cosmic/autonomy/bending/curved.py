@@ -316,8 +316,13 @@ class Rubbed:
         ends = [float(each.travel_um[-1]) for each in self.contacts]
         if tops_um is None:
             return ends
+        # What was hardly pushed turns back at the first place after the contact.
+        begins = [float(each.travel_um[1]) for each in self.contacts]
         tops = np.repeat(np.asarray(tops_um, dtype=np.float64), self.probes)
-        return [min(*each) for each in zip(tops.tolist(), ends, strict=True)]
+        return [
+            min(max(top, begin), end)
+            for top, begin, end in zip(tops.tolist(), begins, ends, strict=True)
+        ]
 
     def _by_span(self, contacts: Sequence[Contact], branches: Sequence[Branches]) -> Curves:
         every = zip(contacts, self.levers_um, branches, strict=True)

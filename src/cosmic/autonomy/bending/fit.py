@@ -402,6 +402,7 @@ def assess_campaign(
     """
     settings = settings or FitSettings()
     refits = refits or Refits()
+    given = [*fibres, *standards]
     about, fibres, rub = _about_friction(fibres, settings, refits)
     standards = _about_their_own(
         standards, rub._replace(friction=about), settings, refits.of_standards
@@ -425,7 +426,8 @@ def assess_campaign(
         # How far the loops are open tells then, and that is no straight line: it is taken again
         # about where it lies.
         rubs = min(max(about + float(assessed.common.mean[FRICTION]), LEAST_RUB), MOST_RUB)
-        about, every = refits.about(every, rubs, slides=True)
+        numbers = [*range(len(fibres)), *(len(fibres) + n for n in found.used)]
+        about, every = refits.about([given[n] for n in numbers], rubs, slides=True)
         every = [*_held(every[: len(fibres)]), *every[len(fibres) :]]
         every = _unsure(every, found.jump_part)
         assessed = _assessed(every, settings, rub, friction=about)

@@ -23,7 +23,6 @@ NEWTON: Final = 3
 LEAST_UM: Final = 1e-9
 """By which friction moves the contact: where it is less, the contact slides at once."""
 
-
 LAID_RUB: Final = 0.3
 """Friction that curves are laid out for at least; less of it is a part."""
 
@@ -49,6 +48,18 @@ MISLEADS: Final = math.log(0.02)
 """How likely it is that something else has bent the curve of a span, as a logarithm."""
 
 
+HARDLY: Final = 3
+"""Of `RUBS_TRIED`: with less than this the friction turns round on so short a way that it may well
+slide at once."""
+
+STICKS_BY: Final = 2.0
+"""Of a logarithm: so much more likely a contact that hardly sticks must be than one that never
+does, to be believed."""
+
+BEFORE_TOP: Final = (0.94, 0.97, 0.985, 0.995, 1.0)
+"""Of the travel at which a push turns back: friction may turn round on a very short way."""
+
+
 class Rub(NamedTuple):
     """What is known of friction between probe and fibre along it.
 
@@ -66,19 +77,6 @@ class Rub(NamedTuple):
     std: float
     gives: float = 1.0
     slides: bool = False
-
-
-HARDLY: Final = 3
-"""Of `RUBS_TRIED`: with less than this the friction turns round on so short a way that it may well
-slide at once."""
-
-STICKS_BY: Final = 2.0
-"""Of a logarithm: so much more likely a contact that hardly sticks must be than one that never
-does, to be believed."""
-
-
-BEFORE_TOP: Final = (0.94, 0.97, 0.985, 0.995, 1.0)
-"""Of the travel at which a push turns back: friction may turn round on a very short way."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -215,7 +213,8 @@ def known_rub(
 
     rubs, gives = np.arange(RUBS_TRIED[0], RUBS_TRIED[-1], STEP), np.log(SIDES_TRIED)
     likely = PchipInterpolator(RUBS_TRIED, sticks, axis=1)(rubs)
-    likely = likely - 0.5 * ((rubs - settings.friction) / settings.friction_std) ** 2
+    believed = (rubs - settings.friction) / max(settings.friction_std, STEP)
+    likely = likely - 0.5 * believed**2
     likely -= 0.5 * ((gives[:, None] + gives_log) / max(settings.side_std_part, LEAST_SIDE)) ** 2
     weights = np.exp(likely - likely.max())
     weights /= weights.sum()
