@@ -24,7 +24,7 @@ LOADS: Final = 40
 HEAVIEST: Final = 1.3
 """Load in units of EI/lever^2; the deflection reaches 0.4 of the lever."""
 
-RUBS: Final = (1.0, 0.0, -1.0)
+FRICTION_SIGNS: Final = (1.0, 0.0, -1.0)
 """Of the friction there may be: what equilibria are sought with."""
 
 ROUNDS: Final = 40
@@ -157,7 +157,7 @@ def balanced(
         found[:, moving] = rows
         away, turns = np.abs(rows[2]), np.abs(turned - factors).max(axis=0)
         # Each probe is tried until all its loads are met, or none of the rest moves any more.
-        probes, lever = moving // (len(RUBS) * LOADS), pushes.given[1]
+        probes, lever = moving // (len(FRICTION_SIGNS) * LOADS), pushes.given[1]
         unmet = np.bincount(probes[away >= MET_PART * lever], minlength=count) > 0
         on = unmet[probes] & ((away >= STILL_PART * lever) | (turns >= STILL_PART))
         factors = turned
@@ -173,7 +173,7 @@ def _pushes(
 ) -> tuple[_Pushes, Floats, tuple[int, ...]]:
     """Return all loads, where their contacts are sought first, and the shape of `Balance`."""
     gives = np.array([each.gives_um3 for each in fibres], dtype=np.float64)[:, :, None, None]
-    shape = (*gives.shape[:2], len(RUBS), LOADS)
+    shape = (*gives.shape[:2], len(FRICTION_SIGNS), LOADS)
 
     def spread(values: Floats) -> Floats:
         return np.broadcast_to(values, shape).ravel()
@@ -183,7 +183,7 @@ def _pushes(
 
     levers = of_fibres([each.lever_um for each in fibres])
     loads = np.linspace(0.0, 1.0, LOADS) ** 1.5 * (HEAVIEST / levers**2)
-    rub = math.atan(friction) * np.array(RUBS)[:, None]
+    rub = math.atan(friction) * np.array(FRICTION_SIGNS)[:, None]
     places = of_fibres([each.at_um for each in fibres])
     given = np.array([spread(each) for each in (places, levers, loads, rub, gives)])
     fibre = np.repeat(np.arange(len(fibres)), given.shape[1] // len(fibres))

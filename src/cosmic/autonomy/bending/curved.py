@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.autonomy.bending.balance import LOADS, RUBS, PushedFibre, balanced
+from cosmic.autonomy.bending.balance import FRICTION_SIGNS, LOADS, PushedFibre, balanced
 from cosmic.autonomy.bending.friction import (
     Branches,
     Contact,
@@ -405,7 +405,7 @@ def _contact(
             f"the fibre lies at {math.degrees(shape.slope_rad):.0f} deg to the jaws at the "
             "probe: it slides off instead of bending; push it nearer to the jaws"
         )
-    without = RUBS.index(0.0)
+    without = FRICTION_SIGNS.index(0.0)
     # At the equilibria without friction themselves, for between them curves are straight lines,
     # and as many places for each fibre.
     nodes = travel[without, : ends[without]]

@@ -11,7 +11,7 @@ from cosmic.autonomy.bending.bent_shape import ShapeFit, fitted_shape, turned_in
 from cosmic.autonomy.bending.budget import budget_of
 from cosmic.autonomy.bending.checks import checked
 from cosmic.autonomy.bending.curved import NaturalShape
-from cosmic.autonomy.bending.friction import Rub, known_rub
+from cosmic.autonomy.bending.friction import Friction, known_friction
 from cosmic.autonomy.bending.holds import UNKNOWN_HOLDS, Holds, holds_of
 from cosmic.autonomy.bending.inference import (
     DRIFT,
@@ -185,7 +185,7 @@ class Refits:
 
     def __init__(self) -> None:
         self._standards: Refits | None = None
-        self._about: Rub | None = None
+        self._about: Friction | None = None
         self._kept: dict[int, MeasuredFibre] = {}
 
     @property
@@ -195,7 +195,9 @@ class Refits:
             self._standards = Refits()
         return self._standards
 
-    def as_before(self, fibres: Sequence[MeasuredFibre]) -> tuple[Rub | None, list[MeasuredFibre]]:
+    def as_before(
+        self, fibres: Sequence[MeasuredFibre]
+    ) -> tuple[Friction | None, list[MeasuredFibre]]:
         """Return about what fibres were fitted before, and these fitted about it."""
         if self._about is None:
             return None, list(fibres)
@@ -216,14 +218,14 @@ class Refits:
         gives, slides : float, bool
             See `MeasuredFibre.about`.
         """
-        wanted = Rub(friction, 0.0, gives, slides)
+        wanted = Friction(friction, 0.0, gives, slides)
         about = self._about
         if about is None or not _near(about, wanted):
             about, self._kept = wanted, {}
         self._about = about
         return about.friction, self._fitted(fibres, about)
 
-    def _fitted(self, fibres: Sequence[MeasuredFibre], about: Rub) -> list[MeasuredFibre]:
+    def _fitted(self, fibres: Sequence[MeasuredFibre], about: Friction) -> list[MeasuredFibre]:
         for each in fibres:
             if id(each.raw) not in self._kept:
                 self._kept[id(each.raw)] = each.about(
@@ -232,7 +234,7 @@ class Refits:
         return [self._kept[id(each.raw)].at(each.part).held(each.holds) for each in fibres]
 
 
-def _near(one: Rub, other: Rub) -> bool:
+def _near(one: Friction, other: Friction) -> bool:
     """Return whether what is fitted about one stands for the other as well."""
     return (
         abs(one.friction - other.friction) <= (NEAR_SLIDING if one.slides else NEAR)
@@ -446,14 +448,14 @@ def _about_friction(
     refits: Refits,
     *,
     may_slide: bool = True,
-) -> tuple[float, list[MeasuredFibre], Rub]:
+) -> tuple[float, list[MeasuredFibre], Friction]:
     """Return a friction, fibres fitted about it, and what the shapes of their curves say of it."""
     before, every = refits.as_before(fibres)
-    about = before or Rub(settings.friction, 0.0)
+    about = before or Friction(settings.friction, 0.0)
     rub = about
     for _ in range(AGAIN):
         gave = math.log(about.gives)
-        rub = known_rub(_fits_of(every), settings, gives_log=gave, may_slide=may_slide)
+        rub = known_friction(_fits_of(every), settings, gives_log=gave, may_slide=may_slide)
         rub = rub._replace(gives=rub.gives * about.gives)
         if rub.slides or _near(rub, about):
             break
@@ -463,7 +465,7 @@ def _about_friction(
 
 
 def _about_their_own(
-    standards: Sequence[MeasuredFibre], like: Rub, settings: FitSettings, refits: Refits
+    standards: Sequence[MeasuredFibre], like: Friction, settings: FitSettings, refits: Refits
 ) -> list[MeasuredFibre]:
     """Return standards fitted about what they show together: glass rubs otherwise than fibres.
 
@@ -472,7 +474,7 @@ def _about_their_own(
     if like.slides:
         return [each.rubbed(slides=True) for each in standards]
     # Whether contacts stick the fibres tell better.
-    rub = known_rub(_fits_of(standards), settings, may_slide=False)
+    rub = known_friction(_fits_of(standards), settings, may_slide=False)
     if abs(rub.friction - like.friction) <= TWO_SIDED * rub.std:
         _, every = refits.about(standards, like.friction)
     else:
@@ -557,7 +559,7 @@ def _by_itself(standard: MeasuredFibre, settings: FitSettings) -> BendingResult:
 def _assessed(
     fibres: Sequence[MeasuredFibre],
     settings: FitSettings,
-    rub: Rub | None = None,
+    rub: Friction | None = None,
     *,
     friction: float | None = None,
 ) -> Population | None:

@@ -23,13 +23,13 @@ NEWTON: Final = 3
 LEAST_UM: Final = 1e-9
 """By which friction moves the contact: where it is less, the contact slides at once."""
 
-LAID_RUB: Final = 0.3
+LAID_FRICTION: Final = 0.3
 """Friction that curves are laid out for at least; less of it is a part."""
 
-RUBS_TRIED: Final = (0.03, 0.07, 0.12, 0.2, 0.3, 0.42, 0.56, 0.72)
+FRICTIONS_TRIED: Final = (0.03, 0.07, 0.12, 0.2, 0.3, 0.42, 0.56, 0.72)
 """Frictions that the shapes of curves are compared with."""
 
-SIDES_TRIED: Final = (0.5, 1.0, 2.0)
+GIVES_TRIED: Final = (0.5, 1.0, 2.0)
 """Of what the probe is taken to give way along the fibre: what else curves are compared with."""
 
 STEP: Final = 0.005
@@ -49,8 +49,8 @@ MISLEADS: Final = math.log(0.02)
 
 
 HARDLY: Final = 3
-"""Of `RUBS_TRIED`: with less than this the friction turns round on so short a way that it may well
-slide at once."""
+"""Of `FRICTIONS_TRIED`: with less than this it turns round on so short a way that the contact may
+well slide at once."""
 
 STICKS_BY: Final = 2.0
 """Of a logarithm: so much more likely a contact that hardly sticks must be than one that never
@@ -60,7 +60,7 @@ BEFORE_TOP: Final = (0.94, 0.97, 0.985, 0.995, 1.0)
 """Of the travel at which a push turns back: friction may turn round on a very short way."""
 
 
-class Rub(NamedTuple):
+class Friction(NamedTuple):
     """What is known of friction between probe and fibre along it.
 
     Attributes
@@ -173,13 +173,13 @@ def _at(values: Floats, part: Floats | float) -> Floats:
     return np.asarray(none + part * (0.5 * (ahead - back) + part * (0.5 * (ahead + back) - none)))
 
 
-def known_rub(
+def known_friction(
     fits: Sequence[SpanFit],
     settings: FitSettings,
     *,
     gives_log: float = 0.0,
     may_slide: bool = True,
-) -> Rub:
+) -> Friction:
     """Return what the shapes of curves say of friction, beside what is known beforehand.
 
     The travel on which friction turns round grows with it, and with what the probe gives way: that
@@ -192,27 +192,27 @@ def known_rub(
     may_slide : bool
         Contacts that never stick are looked for as well.
     """
-    logs = np.zeros(len(SIDES_TRIED) * len(RUBS_TRIED) + 1)
+    logs = np.zeros(len(GIVES_TRIED) * len(FRICTIONS_TRIED) + 1)
     for each in fits:
-        if each.chi2_by_rub:
-            chi2 = np.array(each.chi2_by_rub)
+        if each.chi2_by_friction:
+            chi2 = np.array(each.chi2_by_friction)
             # What does not fit with any friction says little about it.
             excess = max(1.0, float(chi2.min()) / max(each.freedom, 1))
             logs += np.logaddexp(-0.5 * (chi2 - chi2.min()) / excess, MISLEADS)
     if not logs.any():
-        return Rub(settings.friction, settings.friction_std)
-    sticks = logs[:-1].reshape(len(SIDES_TRIED), len(RUBS_TRIED))
+        return Friction(settings.friction, settings.friction_std)
+    sticks = logs[:-1].reshape(len(GIVES_TRIED), len(FRICTIONS_TRIED))
     likely = sticks.max(axis=0)
     best = int(likely.argmax())
     if may_slide and max(likely[0], logs[-1]) > likely[best] - (
         STICKS_BY if best < HARDLY else 0.0
     ):
         # What hardly sticks and what never does look alike: how far loops are open tells then.
-        return Rub(settings.friction, settings.friction_std, slides=True)
+        return Friction(settings.friction, settings.friction_std, slides=True)
     from scipy.interpolate import PchipInterpolator  # half a second, at the first fit
 
-    rubs, gives = np.arange(RUBS_TRIED[0], RUBS_TRIED[-1], STEP), np.log(SIDES_TRIED)
-    likely = PchipInterpolator(RUBS_TRIED, sticks, axis=1)(rubs)
+    rubs, gives = np.arange(FRICTIONS_TRIED[0], FRICTIONS_TRIED[-1], STEP), np.log(GIVES_TRIED)
+    likely = PchipInterpolator(FRICTIONS_TRIED, sticks, axis=1)(rubs)
     believed = (rubs - settings.friction) / max(settings.friction_std, STEP)
     likely = likely - 0.5 * believed**2
     likely -= 0.5 * ((gives[:, None] + gives_log) / max(settings.side_std_part, LEAST_SIDE)) ** 2
@@ -221,4 +221,4 @@ def known_rub(
     of_rubs, of_sides = weights.sum(axis=0), weights.sum(axis=1)
     mean = float(of_rubs @ rubs)
     std = math.hypot(float(np.sqrt(of_rubs @ (rubs - mean) ** 2)), LIKE_STD, UNLIKE_PART * mean)
-    return Rub(mean, min(std, settings.friction_std), math.exp(float(of_sides @ gives)))
+    return Friction(mean, min(std, settings.friction_std), math.exp(float(of_sides @ gives)))

@@ -199,47 +199,72 @@ def readings_of(
     rows = _rows(fits, slides=slides)
     span = np.array([each.span for each in rows])
     k = np.array([each.k_un_um for each in rows])
-    sign = np.array([each.sign for each in rows])
     friction = np.array([each.by_friction for each in rows])
     glass = certified is not None
     softer, by_shear, shear = _sheared(response.by_square[span], settings, glass=glass)
     to_common = _to_common(fits, rows, friction, response, by_shear, part)
     own = (*_own(response, span, settings, direction), shear)
     if glass:
+        std = friction_std or settings.friction_std
+        own = (*own, *_of_glass(to_common, friction, settings, friction_std=std, slides=slides))
         # Glass rubs and shears otherwise than fibres do.
-        sliding, other = to_common[:, SLIDES].copy(), float(slides and not settings.slides)
-        # Where it slides, how much friction there is tells of all.
-        slides_std = 0.0 if slides else settings.slides_std_part
         to_common[:, [FRICTION, SHEAR, SLIDES]] = 0.0
-        own = (
-            *own,
-            ("friction", "", friction, 0.0, friction_std or settings.friction_std),
-            ("the probe slides on glass", "", sliding, other, slides_std),
-        )
     # The direction was found as if all contacts lay where they are told to.
     to_common[:, CONTACT] += direction.by_contact * response.by_direction[span]
-    same = span[:, None] == span[None, :]
-    freed = None if glass else _freed(fits, rows, holds)
-    if freed is not None:
-        shift, askew = freed
-        # The friction along the fibre may have let go as well.
-        std = holds.along_std if math.isfinite(holds.along_std) else 0.5 * settings.friction
-        own = (*own, (*ALONG, np.where(sign > 0.0, friction, 0.0), 0.0, std))
-    else:
-        shift = -_between_branches(span, np.log(k))
-        askew = np.zeros_like(same, dtype=float) if glass else _askew(sign, same, settings)
+    shift, askew, let_go = _with_holds(fits, rows, settings, holds, glass=glass)
     return Readings(
         log_k=np.log(k) + shift + softer,
         noise=_noise(fits, rows, settings),
         span=span,
         to_common=to_common,
-        own=own,
+        own=(*own, *let_go),
         repeat=_repeated(response, span, settings),
         askew=askew,
         response=response,
         longest=_longest(response),
         certified=certified,
         slipped=slipped,
+    )
+
+
+def _with_holds(
+    fits: Sequence[SpanFit],
+    rows: Sequence["_Row"],
+    settings: FitSettings,
+    holds: Holds,
+    *,
+    glass: bool,
+) -> tuple[Floats, Floats, tuple[_Own, ...]]:
+    """Return what sections askew add to ln(k), its covariance, and friction along that let go."""
+    span = np.array([each.span for each in rows])
+    sign = np.array([each.sign for each in rows])
+    freed = None if glass else _freed(fits, rows, holds)
+    if freed is not None:
+        # The friction along the fibre may have let go as well.
+        std = holds.along_std if math.isfinite(holds.along_std) else 0.5 * settings.friction
+        friction = np.array([each.by_friction for each in rows])
+        return *freed, ((*ALONG, np.where(sign > 0.0, friction, 0.0), 0.0, std),)
+    shift = -_between_branches(span, np.log([each.k_un_um for each in rows]))
+    same = span[:, None] == span[None, :]
+    askew = np.zeros_like(same, dtype=float) if glass else _askew(sign, same, settings)
+    return shift, askew, ()
+
+
+def _of_glass(
+    to_common: Floats,
+    by_friction: Floats,
+    settings: FitSettings,
+    *,
+    friction_std: float,
+    slides: bool,
+) -> tuple[_Own, _Own]:
+    """Return how friction on a standard differs from that on fibres, and whether it sticks."""
+    # Where it slides, how much friction there is tells of all.
+    slides_std = 0.0 if slides else settings.slides_std_part
+    mean = float(slides and not settings.slides)
+    return (
+        ("friction", "", by_friction, 0.0, friction_std),
+        ("the probe slides on glass", "", to_common[:, SLIDES].copy(), mean, slides_std),
     )
 
 

@@ -133,9 +133,9 @@ class SpanFit:
         Change of ln(k) if the probe never stuck to the fibre.
     by_friction_sliding : (float, float)
         Change of ln(k) on the ways out and back for a friction of 1, if the probe never stuck.
-    chi2_by_rub : tuple of float
-        `chi2` for each of `friction.SIDES_TRIED` and `friction.RUBS_TRIED`, side by side, and last
-        for a probe that never sticks.
+    chi2_by_friction : tuple of float
+        `chi2` for each of `friction.GIVES_TRIED` and of `friction.FRICTIONS_TRIED`, and last for a
+        probe that never sticks.
     shift_um, shift_std_um : float
         How much farther out contact ends than it began.
     relaxation_part, relaxation_std_part : float
@@ -175,7 +175,7 @@ class SpanFit:
     by_sliding_out: float = 0.0
     by_sliding_back: float = 0.0
     by_friction_sliding: tuple[float, float] = (0.0, 0.0)
-    chi2_by_rub: tuple[float, ...] = ()
+    chi2_by_friction: tuple[float, ...] = ()
     shift_um: float = math.nan
     shift_std_um: float = math.nan
     relaxation_part: float = math.nan

@@ -25,7 +25,7 @@ from cosmic.autonomy.bending.branch import stuck as clings
 from cosmic.autonomy.bending.crept import Loads, lost
 from cosmic.autonomy.bending.curved import NaturalShape, OutAndBack, PushedCurve, rubbed_of
 from cosmic.autonomy.bending.freed import freed_of
-from cosmic.autonomy.bending.friction import LAID_RUB, RUBS_TRIED, SIDES_TRIED
+from cosmic.autonomy.bending.friction import FRICTIONS_TRIED, GIVES_TRIED, LAID_FRICTION
 from cosmic.autonomy.bending.response import straight
 from cosmic.autonomy.bending.result import Quality, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
@@ -117,9 +117,9 @@ class _Pushed:
         return cls(points, shape, first, shape.lever_um(settings.offset_um), loads)
 
     def gives_um3(self, settings: FitSettings) -> list[float]:
-        """Return how far probes give way along the fibre, those of `SIDES_TRIED`."""
+        """Return how far probes give way along the fibre, those of `GIVES_TRIED`."""
         ei_un_um2 = max(self.first.k_un_um, 0.0) * self.lever_um**3 / 3.0
-        return [part * ei_un_um2 / settings.side_un_um for part in SIDES_TRIED]
+        return [part * ei_un_um2 / settings.side_un_um for part in GIVES_TRIED]
 
     def top_um(self, settings: FitSettings) -> float:
         """Return how far the probe has come from the first contact on where it turns back."""
@@ -140,9 +140,9 @@ class _Laid:
         The same with `LESS` and `MORE` of the friction.
     stiffer, softer : OutAndBack
         Of a contact that sticks to probes that give way along the fibre less and more, the first
-        and the last of `SIDES_TRIED`.
+        and the last of `GIVES_TRIED`.
     tried : tuple of OutAndBack
-        Of a contact that sticks, with each of `SIDES_TRIED` and of `RUBS_TRIED`.
+        Of a contact that sticks, with each of `GIVES_TRIED` and of `FRICTIONS_TRIED`.
     """
 
     sticks: OutAndBack
@@ -160,7 +160,7 @@ class _Laid:
         """Return the curves of each, laid out together."""
         if not pushes:
             return []
-        most = max(friction, LAID_RUB)
+        most = max(friction, LAID_FRICTION)
         rubbed = rubbed_of(
             [(each.shape, each.gives_um3(settings)) for each in pushes],
             depth_um=settings.offset_um,
@@ -168,10 +168,10 @@ class _Laid:
             friction=most,
         )
         tops = [each.top_um(settings) for each in pushes]
-        sides = range(len(SIDES_TRIED))
-        nominal = SIDES_TRIED.index(1.0)
+        sides = range(len(GIVES_TRIED))
+        nominal = GIVES_TRIED.index(1.0)
         near = [part * friction / most for part in (1.0, LESS, MORE)]
-        tried = [each / most for each in RUBS_TRIED]
+        tried = [each / most for each in FRICTIONS_TRIED]
         sticks = rubbed.curves(tops, parts=[*near, *tried])
         slides = rubbed.sliding(tops, parts=near)
         return [
@@ -284,7 +284,7 @@ class _Model:
         For all that it is taken to give way.
         """
         out, back = self._apart(self._laid.softer, self._laid.stiffer)
-        apart = SIDES_TRIED[-1] - SIDES_TRIED[0]
+        apart = GIVES_TRIED[-1] - GIVES_TRIED[0]
         return out / apart, back / apart
 
     def by_sliding(self) -> tuple[float, float]:
@@ -337,7 +337,7 @@ class _Model:
         walked = self._settings.drift_un_sqrt_s**2 * np.maximum(walk, 0.0)
         return np.asarray(np.diag(single) + walked, dtype=np.float64)
 
-    def chi2_by_rub(self, found: "_Found") -> tuple[float, ...]:
+    def chi2_by_friction(self, found: "_Found") -> tuple[float, ...]:
         """Return what is left with each side and friction tried, and last if it never sticks.
 
         All else is sought anew, as if forces were straight lines of it.
@@ -573,7 +573,7 @@ def _span_result(
         by_side_out=model.by_side()[0],
         by_side_back=model.by_side()[1],
         by_friction_sliding=model.by_friction_sliding(),
-        chi2_by_rub=model.chi2_by_rub(found),
+        chi2_by_friction=model.chi2_by_friction(found),
         by_sliding_out=model.by_sliding()[0],
         by_sliding_back=model.by_sliding()[1],
         shift_um=float(back[1] - out[1]),

@@ -7,7 +7,7 @@ import pytest
 
 from cosmic.autonomy.bending.curved import NaturalShape, rubbed_of
 from cosmic.autonomy.bending.fit import Certificate, assess_campaign, measure_fibre
-from cosmic.autonomy.bending.friction import LAID_RUB, known_rub
+from cosmic.autonomy.bending.friction import LAID_FRICTION, known_friction
 from cosmic.autonomy.bending.result import SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
 from oracles.pushed_rod import arc
@@ -45,7 +45,7 @@ def test_a_push_out_and_back_follows_the_law_of_coulomb(
     turn_deg: float, friction: float, side: float, span_um: float, ei: float
 ) -> None:
     shape = NaturalShape(*arc(ARC_UM, turn_deg, 400).T, span_um)
-    most = max(friction, LAID_RUB)
+    most = max(friction, LAID_FRICTION)
     rubbed = rubbed_of([(shape, (ei / side,))], depth_um=0.0, radius_um=20.0, friction=most)
     stroke = min(0.1 * span_um, 40.0, 60.0 * span_um**3 / (3.0 * ei))
     ((((out, back),),),) = rubbed.curves([stroke], parts=[friction / most])
@@ -73,28 +73,28 @@ def fits(world: World, seed: int, count: int = 5) -> list[SpanFit]:
 
 @pytest.mark.parametrize("friction", [0.15, 0.3, 0.5])
 def test_friction_is_read_from_the_shapes_of_curves(friction: float) -> None:
-    found = known_rub(fits(dataclasses.replace(WORLD, friction=(friction,) * 2), 3), SETTINGS)
+    found = known_friction(fits(dataclasses.replace(WORLD, friction=(friction,) * 2), 3), SETTINGS)
     assert not found.slides
     assert found.friction == pytest.approx(friction, abs=0.12)
     assert found.std < 0.09
 
 
 def test_a_probe_that_never_sticks_is_noticed() -> None:
-    found = known_rub(fits(dataclasses.replace(WORLD, slides=True), 3), SETTINGS)
+    found = known_friction(fits(dataclasses.replace(WORLD, slides=True), 3), SETTINGS)
     assert found.slides
     assert found.std == SETTINGS.friction_std
 
 
 def test_a_probe_that_gives_way_more_than_it_should_is_noticed() -> None:
     soft, stiff = (
-        known_rub(fits(dataclasses.replace(WORLD, probe_side_un_um=side), 3), SETTINGS).gives
+        known_friction(fits(dataclasses.replace(WORLD, probe_side_un_um=side), 3), SETTINGS).gives
         for side in (5.0, 20.0)
     )
     assert soft > 1.2 > 0.9 > stiff
 
 
 def test_without_any_span_nothing_is_known() -> None:
-    found = known_rub([], SETTINGS)
+    found = known_friction([], SETTINGS)
     assert (found.friction, found.std) == (SETTINGS.friction, SETTINGS.friction_std)
 
 
