@@ -38,6 +38,7 @@ from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.bending.span_fit import fit_spans
 from cosmic.autonomy.bending.standards import (
     UNKNOWN_GAIN,
+    CheckedStandards,
     ForceScale,
     StandardReading,
     check_standards,
@@ -47,6 +48,8 @@ from cosmic.frame.units import TWO_SIDED
 
 NEAR: Final = 0.03
 """Of friction: what spans were fitted about stands for so much more and less."""
+GLASS_STD: Final = 0.15
+"""Of friction: that of glass less that of fibres (0.3 to 0.6, and 0.2 to 0.4 on steel)."""
 NEAR_SLIDING: Final = 0.06
 """The same where contacts never stick: forces are nearly straight lines of it then."""
 
@@ -406,36 +409,51 @@ def assess_campaign(
     refits = refits or Refits()
     given = [*fibres, *standards]
     about, fibres, rub = _about_friction(fibres, settings, refits)
-    standards = _about_their_own(
-        standards, rub._replace(friction=about), settings, refits.of_standards
-    )
-    alone = tuple(_by_itself(each, settings) for each in standards)
-    measured = [
-        (each.readings, each.part, () if result.trusted else result.reasons)
-        for each, result in zip(standards, alone, strict=True)
-    ]
-    found = check_standards(measured, settings)
-    alone = tuple(
-        _as_read(result, each.certificate, reading)
-        for each, result, reading in zip(standards, alone, found.readings, strict=True)
-    )
-    settings = found.settings
-    fibres = _held(fibres)
-    verified = bool(found.used)
-    every = _unsure([*fibres, *(standards[n] for n in found.used)], found.jump_part)
-    assessed = _assessed(every, settings, rub, friction=about)
+    like = rub._replace(friction=about)
+    standards = _about_their_own(standards, like, settings, refits.of_standards)
+    alone, found = _read_by(standards, settings)
+    every, assessed = _together(fibres, standards, found, rub, about)
     if rub.slides and assessed:
         # How far the loops are open tells then, and that is no straight line: it is taken again
         # about where it lies.
         rubs = min(max(about + float(assessed.common.mean[FRICTION]), LEAST_RUB), MOST_RUB)
-        numbers = [*range(len(fibres)), *(len(fibres) + n for n in found.used)]
-        about, every = refits.about([given[n] for n in numbers], rubs, slides=True)
-        every = [*_held(every[: len(fibres)]), *every[len(fibres) :]]
-        every = _unsure(every, found.jump_part)
-        assessed = _assessed(every, settings, rub, friction=about)
+        about, again = refits.about(given, rubs, slides=True)
+        fibres, standards = again[: len(fibres)], again[len(fibres) :]
+        alone, found = _read_by(standards, settings)
+        every, assessed = _together(fibres, standards, found, rub, about)
+    settings, verified = found.settings, bool(found.used)
     results = _results(every[: len(fibres)], assessed, settings, verified=verified)
     common = assessed.common if assessed else common_prior(settings)
     return CampaignFit(results, alone, scale_of(common, found, verified=verified), about)
+
+
+def _read_by(
+    standards: Sequence[MeasuredFibre], settings: FitSettings
+) -> tuple[tuple[BendingResult, ...], CheckedStandards]:
+    """Return standards each by itself, and what they say of the scale of the force."""
+    alone = tuple(_by_itself(each, settings) for each in standards)
+    found = check_standards(
+        [
+            (each.readings, each.part, () if result.trusted else result.reasons)
+            for each, result in zip(standards, alone, strict=True)
+        ],
+        settings,
+    )
+    read = zip(standards, alone, found.readings, strict=True)
+    return tuple(_as_read(result, each.certificate, by) for each, result, by in read), found
+
+
+def _together(
+    fibres: Sequence[MeasuredFibre],
+    standards: Sequence[MeasuredFibre],
+    found: CheckedStandards,
+    rub: Friction,
+    about: float,
+) -> tuple[list[MeasuredFibre], Population | None]:
+    """Return fibres and then the standards that count, with what all of them say together."""
+    every = [*_held(fibres), *(standards[n] for n in found.used)]
+    every = _unsure(every, found.jump_part)
+    return every, _assessed(every, found.settings, rub, friction=about)
 
 
 def _fits_of(fibres: Sequence[MeasuredFibre]) -> list[SpanFit]:
@@ -447,15 +465,24 @@ def _about_friction(
     settings: FitSettings,
     refits: Refits,
     *,
-    may_slide: bool = True,
+    like: Friction | None = None,
 ) -> tuple[float, list[MeasuredFibre], Friction]:
-    """Return a friction, fibres fitted about it, and what the shapes of their curves say of it."""
+    """Return a friction, fibres fitted about it, and what the shapes of their curves say of it.
+
+    Parameters
+    ----------
+    like : Friction, optional
+        What others show that rub on the same probe: it gives way the same, and sticks as well.
+    """
     before, every = refits.as_before(fibres)
     about = before or Friction(settings.friction, 0.0)
+    if like and not before:
+        about = like._replace(friction=refits.about(fibres, like.friction, gives=like.gives)[0])
+        _, every = refits.as_before(fibres)
     rub = about
     for _ in range(AGAIN):
-        gave = math.log(about.gives)
-        rub = known_friction(_fits_of(every), settings, gives_log=gave, may_slide=may_slide)
+        gave = math.log(about.gives / (like.gives if like else 1.0))
+        rub = known_friction(_fits_of(every), settings, gives_log=gave, may_slide=not like)
         rub = rub._replace(gives=rub.gives * about.gives)
         if rub.slides or _near(rub, about):
             break
@@ -467,18 +494,12 @@ def _about_friction(
 def _about_their_own(
     standards: Sequence[MeasuredFibre], like: Friction, settings: FitSettings, refits: Refits
 ) -> list[MeasuredFibre]:
-    """Return standards fitted about what they show together: glass rubs otherwise than fibres.
-
-    Where no other friction shows than that of fibres, about that.
-    """
+    """Return standards fitted about what they show together: glass rubs otherwise than fibres."""
     if like.slides:
         return [each.rubbed(slides=True) for each in standards]
-    # Whether contacts stick the fibres tell better.
-    rub = known_friction(_fits_of(standards), settings, may_slide=False)
-    if abs(rub.friction - like.friction) <= TWO_SIDED * rub.std:
-        _, every = refits.about(standards, like.friction)
-    else:
-        _, every, rub = _about_friction(standards, settings, refits, may_slide=False)
+    known = {"friction": like.friction, "friction_std": math.hypot(like.std, GLASS_STD)}
+    settings = settings.model_copy(update=known)
+    _, every, rub = _about_friction(standards, settings, refits, like=like)
     return [each.rubbed(std=rub.std, slides=False) for each in every]
 
 

@@ -121,3 +121,30 @@ def test_curled_fibres_are_measured_right_whether_contacts_stick_or_not(
         errors.append(np.log(found.ei_n_m2 / true))
         assert found.ei_low_n_m2 < true < found.ei_high_n_m2
     assert abs(float(np.mean(errors))) < 0.04
+
+
+@pytest.mark.parametrize(
+    ("friction", "slides", "side"),
+    [(0.06, False, 10.0), (0.1, True, 10.0), (0.3, False, 10.0), (0.3, False, 5.0)],
+)
+def test_a_standard_is_read_about_the_friction_that_is_there(
+    friction: float, slides: bool, side: float
+) -> None:
+    """Half of it, on the same probe; low friction hardly shows whether contacts stick."""
+    session = Session(
+        dataclasses.replace(
+            WORLD, friction=(friction, friction), slides=slides, probe_side_un_um=side
+        ),
+        np.random.default_rng(6),
+    )
+    certificate = Certificate(STANDARD_EI * SCALE, 0.02)
+    beam = measure_fibre(
+        spans_of(session, Fibre.standard(session)), settings=SETTINGS, certificate=certificate
+    )
+    fibres = [
+        measure_fibre(spans_of(session, Fibre.drawn(session)), settings=SETTINGS) for _ in range(6)
+    ]
+    (found,) = assess_campaign(fibres, standards=[beam], settings=SETTINGS).standards
+    assert all(each.chi2 < each.freedom for each in found.spans)
+    read = np.log(found.ei_n_m2 / certificate.ei_n_m2 / session.gain)
+    assert read == pytest.approx(0.0, abs=0.015)
