@@ -324,13 +324,15 @@ def _freed(
 ) -> tuple[Floats, Floats] | None:
     """Return what is to be added to ln(k), and its covariance; None: friction never let go.
 
+    Of a fibre that was not slid it did so in others, if in any: no more is known of it then than
+    how far those lie apart.
+
     On the way out a section askew was as much too stiff as the force fell once friction let go, and
     as in the other spans, but for twist, and as in the other fibres as far as those are alike. What
     is not known of all spans together tells nothing of the clamp. On the way back it may have
     turned round, by any part of that: how far depends on the section.
     """
-    slides = slides_of(fits)
-    if not len(slides.logs):
+    if not (len(slides_of(fits).logs) or math.isfinite(holds.std)):
         return None
     logs, of_span = _held(fits, holds)
     span = np.array([each.span for each in rows])
@@ -369,6 +371,8 @@ def _between(values: Floats, weights: Floats) -> float:
 
     After DerSimonian and Laird.
     """
+    if not len(values):
+        return 0.0
     total = float(weights.sum())
     mean = float(weights @ values) / total
     beyond = float(weights @ (values - mean) ** 2) - (len(values) - 1)

@@ -86,6 +86,23 @@ def test_one_fibre_shows_nothing_of_others() -> None:
     assert holds_of(never) == UNKNOWN_HOLDS
 
 
+def test_a_fibre_that_was_not_slid_may_be_held_as_the_others_are() -> None:
+    parts = [0.3, 0.05, 0.35, 0.2, 0.0, 0.25, 0.1, 0.4]
+    fibres = [slid(seed, held) for seed, held in enumerate(parts)]
+    (free,) = assess_campaign([slid(0, 0.0)]).fibres
+    shown = assess_campaign(fibres).fibres[0]
+    not_slid = [dataclasses.replace(each, freed=None) for each in fibres[0].raw]
+    fibres[0] = measure_fibre(not_slid, settings=FitSettings())
+    found = assess_campaign(fibres).fibres[0]
+    assert found.ei_low_n_m2 < free.ei_n_m2 < found.ei_high_n_m2
+    assert half_width_percent(found) > 2.0 * half_width_percent(shown)
+    alike = [slid(seed, 0.0) for seed in range(FIBRES)]
+    slid_width = half_width_percent(assess_campaign(alike).fibres[0])
+    not_slid = [dataclasses.replace(each, freed=None) for each in alike[0].raw]
+    alike[0] = measure_fibre(not_slid, settings=FitSettings())
+    assert half_width_percent(assess_campaign(alike).fibres[0]) < 1.3 * slid_width
+
+
 @pytest.mark.parametrize("noise_times", [0.2, 5.0])
 def test_holds_are_found_whatever_the_noise_is_taken_to_be(noise_times: float) -> None:
     fibres = [
