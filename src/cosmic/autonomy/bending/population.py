@@ -364,6 +364,8 @@ class _Said:
         variance = float(of_depth @ (logs - middle) ** 2)
         whole = fixed_covariance(read) + variance * np.outer(by_depth, by_depth)
         whole = whole + varied_covariance(read, settings)[here] * posterior.variation**2
+        # A standard that the model does not fit says as much less of what is common.
+        whole = whole * posterior.excess
         away = read.log_k - own_mean(read) - geometry[1] - by_depth * (middle - logs[here])
         if read.certified is not None:
             away = away - read.certified[0]

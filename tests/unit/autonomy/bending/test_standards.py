@@ -106,6 +106,24 @@ def test_a_poor_standard_does_not_outweigh_the_certificate_of_the_sensor() -> No
     assert abs(scale.off_part) < 0.02, "of 7 % that it says, which may as well be its own error"
 
 
+def test_a_standard_that_no_clamp_explains_says_less_of_the_scale() -> None:
+    session = Session(WORLD, np.random.default_rng(5))
+    beam = Fibre.standard(session)
+    spans = spans_of(session, beam)
+    # Jaws that turn, say: the shortest span and the longest are soft, those between are not.
+    uneven = [
+        dataclasses.replace(each, force_un=each.force_un * (1.0 + off))
+        for each, off in zip(spans, (-0.04, 0.01, 0.02, 0.01, -0.04), strict=True)
+    ]
+    fits, misfits = (
+        measure_fibre(each, settings=SETTINGS, certificate=CERTIFICATE) for each in (spans, uneven)
+    )
+    sure = assess_campaign([], standards=[fits], settings=SETTINGS).scale.standards[0]
+    unsure = assess_campaign([], standards=[misfits], settings=SETTINGS).scale.standards[0]
+    assert not unsure.refused, "it is a measurement, if a poor one"
+    assert unsure.off_std_part > 1.5 * sure.off_std_part
+
+
 def test_a_drift_larger_than_foreseen_is_followed() -> None:
     scale = scale_of(1.0, 1.05, 1.10)
     assert scale.verified
