@@ -150,18 +150,24 @@ class TimeScale:
         """Note that somebody waits for `until_s`; return how long to wait, in wall time.
 
         Who waits too long keeps the time from hurrying on, no more; who wakes too early, waits on.
+        While there is a worker that leads, only who is due next need wake in time: the time runs
+        as the wall does from then until that one goes on, and works or waits again.
         """
         with self._lock:
-            left_s = until_s - self._settle()
+            now_s = self._settle()
+            left_s = until_s - now_s
             if left_s <= 0.0:
                 return 0.0
             wait_s = left_s / self._rate
             if self._held_wall_s is not None:
                 wait_s += LOOK_S  # and is woken when the time goes on
-            if self._leading and self._busy:
+            following = self._following()
+            if self._leading and (self._busy or (following and following.due_s < until_s)):
                 wait_s = max(wait_s, min(left_s, LOOK_S))
             self._waits[token] = _Wait(condition, until_s, self._wall_s + wait_s)
-            return wait_s
+            late = self._woken(now_s)
+        _wake(each for each in late if each.due_s < until_s)
+        return wait_s
 
     def end_wait(self, token: object) -> None:
         """Note that it goes on."""
@@ -175,9 +181,21 @@ class TimeScale:
             now_s = self._settle()
             self._busy += busy
             self._leading += leading
-            waits = () if self._busy else tuple(self._waits.values())
-            late = [each for each in waits if self._late(each, now_s)]
+            late = self._woken(now_s)
         _wake(late)
+
+    def _following(self) -> _Wait | None:
+        """Return who is due next."""
+        return min(self._waits.values(), key=lambda each: each.due_s, default=None)
+
+    def _woken(self, now_s: float) -> list[_Wait]:
+        """Return who would wake too late, where it matters: nobody is at work."""
+        if self._busy:
+            return []
+        following = self._following()
+        if self._leading and following is not None:
+            return [following] if self._late(following, now_s) else []
+        return [each for each in self._waits.values() if self._late(each, now_s)]
 
     def _late(self, wait: _Wait, now_s: float) -> bool:
         due_wall_s = self._wall_s + (wait.due_s - now_s) / self._rate

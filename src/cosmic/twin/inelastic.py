@@ -15,7 +15,6 @@ CELLS: Final = 16
 TIMES_S: Final = np.array([0.03, 0.3, 3.0, 30.0, 300.0])
 """One for each decade; what is slower does not show in a measurement."""
 
-ALL_TIMES: Final = np.ones(len(TIMES_S))
 SAME_TIME: Final = 1e-9
 """Part by which times between looks differ that are the same but for rounding."""
 
@@ -53,6 +52,8 @@ class Inelastic:
         self._slope = slope
         self._yield = yield_curvature
         self._creeping = np.zeros((len(TIMES_S), CELLS))
+        self._far = np.empty_like(self._creeping)
+        self._far = np.empty_like(self._creeping)
         self._set = np.zeros(CELLS)
         self._has_set = False
         self._before = np.zeros(CELLS)
@@ -65,8 +66,12 @@ class Inelastic:
     def offset_um(self, arm_um: float) -> float:
         """Return how far the fibre stands back, at so far from the clamp."""
         levers = self._levers_um(arm_um)
-        crept = self._slope * float(ALL_TIMES.dot(self._creeping.dot(levers)))
-        return self._cell_um * (crept + float(self._set.dot(levers)) if self._has_set else crept)
+        # No `dot`: it gives the interpreter up, and has to win it back, at each look.
+        np.multiply(self._creeping, levers, out=self._far)
+        back = self._slope * float(np.add.reduce(self._far, axis=None))
+        if self._has_set:
+            back += float(np.add.reduce(self._set * levers))
+        return self._cell_um * back
 
     def follow(self, time_s: float, force_un: float, arm_um: float, ei_un_um2: float) -> None:
         """Take note of the force there from now on; times rise."""

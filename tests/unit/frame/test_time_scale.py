@@ -115,6 +115,48 @@ def test_who_waits_while_others_work_is_woken_at_their_end(bench: Bench) -> None
     assert woken == ["told"]
 
 
+class Told(threading.Condition):
+    """Counts how often it was notified."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.times = 0
+
+    @override
+    def notify_all(self) -> None:
+        self.times += 1
+        super().notify_all()
+
+
+def test_only_who_is_due_next_is_woken_at_the_end_of_work(bench: Bench) -> None:
+    bench.worker(leads=True)
+    working, first, second = bench.worker(), Told(), Told()
+    working.busy()
+    bench.time_scale.begin_wait("second", second, 0.04)
+    bench.time_scale.begin_wait("first", first, 0.015)
+    working.idle()
+    assert (first.times, second.times) == (1, 0)
+    bench.time_scale.end_wait("first")
+    working.busy()
+    working.idle()
+    assert (first.times, second.times) == (1, 1)
+
+
+def test_who_is_due_later_waits_longer_and_is_woken_when_the_next_has_gone_on(
+    bench: Bench,
+) -> None:
+    bench.worker(leads=True)
+    second, wait_s = Told(), bench.time_scale.begin_wait
+    assert wait_s("first", Told(), 0.02) == pytest.approx(0.02 / RATE)
+    assert wait_s("second", second, 0.04) == pytest.approx(0.02), "it looks again now and then"
+    bench.time_scale.end_wait("first")
+    assert second.times == 0, "the first may be at work in a moment"
+    wait_s("first", Told(), 5.0)
+    assert second.times == 1
+    bench.time_scale.end_wait("second")
+    assert wait_s("second", second, 0.02) == pytest.approx(0.02 / RATE)
+
+
 def test_the_time_waits_at_the_nearest_horizon_and_makes_up_for_nothing(bench: Bench) -> None:
     near, far = ScaledHorizon(bench.time_scale), ScaledHorizon(bench.time_scale)
     near.move_to(10.0)

@@ -382,7 +382,8 @@ class Campaign:
     def _analyse(self) -> None:
         """Put final values into the record, and see whether all is there that was asked for."""
         good = self.progress.good
-        analysis = finish(self.store)
+        with self.work.clock.at_work():
+            analysis = finish(self.store)
         self._recorder.read_again()
         if self._treatment.standard is not None and not (analysis and analysis.scale.verified):
             self._shortfall = "the standard did not verify the scale of the force"

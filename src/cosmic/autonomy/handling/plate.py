@@ -212,10 +212,15 @@ def _under(
     return count
 
 
-def distance_um(line: Floats, other: Floats) -> float:
-    """Return the smallest distance of the points of two lines."""
-    away = line[:, None, :] - other[None, :, :]
-    return float(np.sqrt((away**2).sum(axis=2).min()))
+def within_um(line: Floats, other: Floats, um: float) -> bool:
+    """Return whether two lines have points that are nearer to each other than `um`."""
+    # Most lines lie far apart: then so do boxes about them, and no pair of points is looked at.
+    apart = np.maximum(line.min(axis=0) - other.max(axis=0), other.min(axis=0) - line.max(axis=0))
+    if not (apart < um).all():
+        return False
+    ahead = line[:, 0, None] - other[None, :, 0]
+    aside = line[:, 1, None] - other[None, :, 1]
+    return bool((ahead * ahead + aside * aside).min() < um * um)
 
 
 def _turn(angle_deg: float) -> Floats:

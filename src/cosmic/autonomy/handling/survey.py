@@ -11,7 +11,7 @@ from typing_extensions import override
 
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.held_fibre import HeldFibre
-from cosmic.autonomy.handling.plate import Candidate, Neighbours, Reach, distance_um, reaches
+from cosmic.autonomy.handling.plate import Candidate, Neighbours, Reach, reaches, within_um
 from cosmic.autonomy.handling.prepare import clear_image
 from cosmic.autonomy.handling.settings import GraspSettings, StandardSettings
 from cosmic.autonomy.handling.sight import SeenFibre, find_seen
@@ -178,7 +178,7 @@ def _leave_fallen(
     measured = [each for each in here if each.bending is not None]
     left = []
     for each in candidates:
-        new = all(distance_um(each.line_um, line) > SAME_UM for line in before)
+        new = not any(within_um(each.line_um, line, SAME_UM) for line in before)
         if before and new and any(_unlike(each, fibre) < 1.0 for fibre in measured):
             work.shared.skipped.append(each)
             left.append(replace(each, problem=MEASURED))
@@ -257,7 +257,7 @@ def _lonely(work: HandlingContext, candidate: Candidate) -> str:
 
 def _crowded(work: HandlingContext, candidate: Candidate) -> str:
     near = (
-        distance_um(candidate.line_um, line) < work.settings.grasp.clear_um
+        within_um(candidate.line_um, line, work.settings.grasp.clear_um)
         for line in work.shared.lines_um
         if line is not candidate.line_um
     )

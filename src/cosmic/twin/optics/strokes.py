@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Final
 
 import cv2
@@ -130,10 +131,11 @@ def _distances(where: Patch, line: Floats, reach: float, sigma: float) -> tuple[
     """Return the distance of each cell from a line, and how much of its square ends is there."""
     nearest = np.full((where.height, where.width), FAR, np.float32)
     ends = np.ones_like(nearest)
-    last = len(line) - 2
-    for number in range(last + 1):
-        first, second = line[number], line[number + 1]
-        length = math.hypot(*(second - first))
+    nodes = line.tolist()  # for two numbers no array is worth it
+    last = len(nodes) - 2
+    for number, (first, second) in enumerate(pairwise(nodes)):
+        ahead, aside = second[0] - first[0], second[1] - first[1]
+        length = math.hypot(ahead, aside)
         if length < 1e-9:
             continue
         box = _box(where, first, second, reach)
@@ -142,17 +144,17 @@ def _distances(where: Patch, line: Floats, reach: float, sigma: float) -> tuple[
         rows, columns = box
         x = np.arange(columns.start, columns.stop, dtype=np.float32) - np.float32(first[0])
         y = np.arange(rows.start, rows.stop, dtype=np.float32)[:, None] - np.float32(first[1])
-        ux, uy = ((second - first) / length).astype(np.float32)
+        ux, uy = np.float32(ahead / length), np.float32(aside / length)
         along, across = x * ux + y * uy, y * ux - x * uy
         low = -FAR if number == 0 else 0.0
         high = FAR if number == last else length
-        beyond = along - np.clip(along, low, high)
+        beyond = along - np.minimum(np.maximum(along, low), high)
         distance = np.sqrt(across * across + beyond * beyond)
-        closer = distance < nearest[box]
-        nearest[box] = np.where(closer, distance, nearest[box])
+        part = nearest[box]
         if number in (0, last):
             inside = _edges(along, length, sigma, first=number == 0, last=number == last)
-            ends[box] = np.where(closer, inside, ends[box])
+            ends[box] = np.where(distance < part, inside, ends[box])
+        np.minimum(part, distance, out=part)
     return nearest, ends
 
 
@@ -166,10 +168,13 @@ def _edges(along: Single, length: float, sigma: float, *, first: bool, last: boo
     return inside
 
 
-def _box(where: Patch, first: Floats, second: Floats, reach: float) -> tuple[slice, slice] | None:
-    low, high = np.minimum(first, second) - reach, np.maximum(first, second) + reach
-    left, top = max(int(low[0]), 0), max(int(low[1]), 0)
-    right, bottom = min(int(high[0]) + 2, where.width), min(int(high[1]) + 2, where.height)
+def _box(
+    where: Patch, first: list[float], second: list[float], reach: float
+) -> tuple[slice, slice] | None:
+    (x0, y0), (x1, y1) = first, second
+    left, top = max(int(min(x0, x1) - reach), 0), max(int(min(y0, y1) - reach), 0)
+    right = min(int(max(x0, x1) + reach) + 2, where.width)
+    bottom = min(int(max(y0, y1) + reach) + 2, where.height)
     if not (left < right and top < bottom):
         return None
     return slice(top, bottom), slice(left, right)
