@@ -53,7 +53,6 @@ class Inelastic:
         self._yield = yield_curvature
         self._creeping = np.zeros((len(TIMES_S), CELLS))
         self._far = np.empty_like(self._creeping)
-        self._far = np.empty_like(self._creeping)
         self._set = np.zeros(CELLS)
         self._has_set = False
         self._before = np.zeros(CELLS)
