@@ -61,7 +61,7 @@ MET_STD_UM: Final = 1.0
 AGAIN: Final = 3
 """So often a campaign is fitted again at most, until friction stays."""
 
-LEAST_RUB, MOST_RUB = 0.02, 0.8
+LEAST_FRICTION, MOST_FRICTION = 0.02, 0.8
 """Friction that is looked for."""
 
 FARTHEST_LN: Final = 300.0
@@ -416,7 +416,9 @@ def assess_campaign(
     if rub.slides and assessed:
         # How far the loops are open tells then, and that is no straight line: it is taken again
         # about where it lies.
-        rubs = min(max(about + float(assessed.common.mean[FRICTION]), LEAST_RUB), MOST_RUB)
+        rubs = min(
+            max(about + float(assessed.common.mean[FRICTION]), LEAST_FRICTION), MOST_FRICTION
+        )
         about, again = refits.about(given, rubs, slides=True)
         fibres, standards = again[: len(fibres)], again[len(fibres) :]
         alone, found = _read_by(standards, settings)

@@ -13,6 +13,7 @@ from cosmic.autonomy.handling.plate import (
     Reach,
     along,
     reaches,
+    within_um,
 )
 from cosmic.autonomy.handling.settings import GraspSettings
 
@@ -117,3 +118,18 @@ def lies_under(reach: Reach, forward: float) -> bool:
     off = PlateFrame().on_platform(grid, reach.angle_deg) - np.array(reach.tip_um)
     ahead, aside = off[:, 0] * forward, np.abs(off[:, 1])
     return bool(((ahead < 0.0) & (ahead > -6000.0) & (aside < 600.0)).any())
+
+
+def test_lines_are_near_to_each_other_where_any_of_their_points_are() -> None:
+    random = np.random.default_rng(4)
+    agreed = set()
+    for _ in range(200):
+        line, other = (
+            straight(*random.uniform(-700.0, 700.0, 2), random.uniform(0.0, 180.0)).line_um
+            for _ in range(2)
+        )
+        nearest = min(math.dist(one, another) for one in line for another in other)
+        for um in (60.0, 300.0):
+            assert within_um(line, other, um) == within_um(other, line, um) == (nearest < um)
+            agreed.add((um, nearest < um))
+    assert len(agreed) == 4, "each answer was wanted at each distance"
