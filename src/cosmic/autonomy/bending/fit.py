@@ -23,7 +23,13 @@ from cosmic.autonomy.bending.inference import (
     readings_of,
 )
 from cosmic.autonomy.bending.population import Assessed, Population, assess
-from cosmic.autonomy.bending.response import Response, direction_by_touch, response_of, straight
+from cosmic.autonomy.bending.response import (
+    Direction,
+    Response,
+    direction_by_touch,
+    response_of,
+    straight,
+)
 from cosmic.autonomy.bending.result import (
     DRIFT_FORM,
     N_M2_PER_UN_UM2,
@@ -58,6 +64,10 @@ NEAR_GIVES: Final = 0.2
 
 MET_STD_UM: Final = 1.0
 """Of where the probe met the fibre, by the rise of the force."""
+MOST_KEPT: Final = 100
+MOST_FRICTIONS: Final = 8
+"""So many fibres of before stay fitted, about the last frictions: they may come back."""
+
 AGAIN: Final = 3
 """So often a campaign is fitted again at most, until friction stays."""
 
@@ -121,6 +131,8 @@ class MeasuredFibre:
         Of a standard, how well its own friction is known; None: as the settings have it.
     slides : bool
         The probe never sticks to it.
+    direction : Direction or None
+        In which it leaves the jaws, by these spans.
     """
 
     spans: tuple[SpanFit, ...]
@@ -133,6 +145,7 @@ class MeasuredFibre:
     holds: Holds = UNKNOWN_HOLDS
     friction_std: float | None = None
     slides: bool = False
+    direction: Direction | None = None
 
     def at(self, part: float) -> "MeasuredFibre":
         """Return the same, measured when another part of the campaign was over."""
@@ -182,14 +195,16 @@ class MeasuredFibre:
 class Refits:
     """Fibres of a campaign under way, fitted about the friction there, each of them only once.
 
-    With every fibre the friction is a little better known: as long as it stays near to that about
-    which they were fitted, they stay so. Any thread, one at a time.
+    With every fibre the friction is known a little otherwise: as long as it stays near to that
+    about which they were fitted, they stay so, and where it comes back to one of before, they are
+    taken as they were. Any thread, one at a time.
     """
 
     def __init__(self) -> None:
         self._standards: Refits | None = None
         self._about: Friction | None = None
-        self._kept: dict[int, MeasuredFibre] = {}
+        # By the friction about which they were fitted, that used last at the end.
+        self._kept: dict[Friction, dict[int, MeasuredFibre]] = {}
 
     @property
     def of_standards(self) -> "Refits":
@@ -224,17 +239,22 @@ class Refits:
         wanted = Friction(friction, 0.0, gives, slides)
         about = self._about
         if about is None or not _near(about, wanted):
-            about, self._kept = wanted, {}
+            near = [each for each in self._kept if _near(each, wanted)]
+            about = min(near, key=lambda each: abs(each.friction - friction), default=wanted)
         self._about = about
         return about.friction, self._fitted(fibres, about)
 
     def _fitted(self, fibres: Sequence[MeasuredFibre], about: Friction) -> list[MeasuredFibre]:
+        before = self._kept.pop(about, {})
+        # Held on to by what was fitted, no other can have the number of its raw spans.
+        kept = dict(list(before.items())[-MOST_KEPT:])
         for each in fibres:
-            if id(each.raw) not in self._kept:
-                self._kept[id(each.raw)] = each.about(
-                    about.friction, gives=about.gives, slides=about.slides
-                )
-        return [self._kept[id(each.raw)].at(each.part).held(each.holds) for each in fibres]
+            found = before.get(id(each.raw)) or each.about(
+                about.friction, gives=about.gives, slides=about.slides
+            )
+            kept[id(each.raw)] = found
+        self._kept = {**dict(list(self._kept.items())[1 - MOST_FRICTIONS :]), about: kept}
+        return [kept[id(each.raw)].at(each.part).held(each.holds) for each in fibres]
 
 
 def _near(one: Friction, other: Friction) -> bool:
@@ -298,14 +318,7 @@ def _read(fibre: MeasuredFibre, response: Response) -> MeasuredFibre:
     if fibre.certificate is not None:
         log_ei = math.log(fibre.certificate.ei_n_m2 * UN_UM2_PER_N_M2)
         certified = log_ei, fibre.certificate.expanded_part / 2.0
-    seen = all(fibre.raw[n].shape is not None for n in fibre.used)
-    direction = direction_by_touch(
-        response.shapes if seen else (),
-        np.array([each.hinge_um for each in fits]),
-        radius_um=settings.radius_um,
-        noise_um=settings.touch_std_um,
-        prior_rad=math.radians(settings.direction_std_deg),
-    )
+    direction = fibre.direction or _direction(fibre, response)
     readings = readings_of(
         fits,
         response,
@@ -318,7 +331,19 @@ def _read(fibre: MeasuredFibre, response: Response) -> MeasuredFibre:
         friction_std=fibre.friction_std,
         slides=fibre.slides,
     )
-    return replace(fibre, readings=readings)
+    return replace(fibre, readings=readings, direction=direction)
+
+
+def _direction(fibre: MeasuredFibre, response: Response) -> Direction:
+    """Return in which direction a fibre leaves the jaws, by where its spans were met."""
+    seen = all(fibre.raw[n].shape is not None for n in fibre.used)
+    return direction_by_touch(
+        response.shapes if seen else (),
+        np.array([fibre.spans[n].hinge_um for n in fibre.used]),
+        radius_um=fibre.settings.radius_um,
+        noise_um=fibre.settings.touch_std_um,
+        prior_rad=math.radians(fibre.settings.direction_std_deg),
+    )
 
 
 def usable(fits: Sequence[SpanFit]) -> tuple[int, ...]:

@@ -132,15 +132,26 @@ class _Twists(NamedTuple):
 
 def _twists_of(slides: Sequence[Slides], along: float) -> _Twists:
     """Return what the slides say where so much friction along let go with them."""
-    freed = [(each.logs + along * each.by_friction, each.stds) for each in slides]
-    grid = [(part, twist) for part in PARTS for twist in TWISTS]
-    likely = np.array([sum(_of_twist(*each, *pair)[2] for each in freed) for pair in grid])
-    part, twisted = (float(each) for each in _weights(likely) @ np.array(grid))
-    seen = [_of_twist(*each, part, twisted) for each in freed]
-    means, variances = np.array([each[0] for each in seen]), np.array([each[1] for each in seen])
+    grid = np.array([(part, twist) for part in PARTS for twist in TWISTS])
+    logs, stds = _side_by_side(slides, along)
+    likely = _of_twists(logs, stds, grid)[2].sum(axis=0)
+    part, twisted = (float(each) for each in _weights(likely) @ grid)
+    means, variances, _ = (
+        each[:, 0] for each in _of_twists(logs, stds, np.array([[part, twisted]]))
+    )
     held = np.array([_held_down(means, variances, each) for each in SPREADS])
     total = float(np.logaddexp.reduce(likely) + np.logaddexp.reduce(held))
     return _Twists(twisted, part, means, variances, total)
+
+
+def _side_by_side(slides: Sequence[Slides], along: float) -> tuple[Floats, Floats]:
+    """Return what slides showed and its standard deviations, a row a fibre; infinite where none."""
+    most = max(len(each.logs) for each in slides)
+    logs, stds = np.zeros((len(slides), most)), np.full((len(slides), most), np.inf)
+    for number, each in enumerate(slides):
+        logs[number, : len(each.logs)] = each.logs + along * each.by_friction
+        stds[number, : len(each.logs)] = each.stds
+    return logs, stds
 
 
 def _held_down(means: Floats, variances: Floats, spread: float) -> float:
@@ -151,16 +162,29 @@ def _held_down(means: Floats, variances: Floats, spread: float) -> float:
     return float(each.sum())
 
 
-def _of_twist(logs: Floats, stds: Floats, part: float, twist: float) -> tuple[float, float, float]:
-    """Return mean of a fibre, variance of that, and ln of how likely its spans lie so far apart."""
+def _of_twists(logs: Floats, stds: Floats, grid: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return mean of each fibre, variance of that, and ln of how likely its spans lie so far apart.
+
+    Parameters
+    ----------
+    logs, stds : ndarray, shape (fibres, spans)
+    grid : ndarray, shape (g, 2)
+        How far spans differ, as a part of the hold and by itself.
+
+    Returns
+    -------
+    tuple of ndarray, shape (fibres, g) each
+    """
     plain = stds**-2.0
-    differs = part * float(plain @ logs) / float(plain.sum())
-    variances = stds**2 + differs**2 + twist**2
-    precision = float((1.0 / variances).sum())
-    mean = float((logs / variances).sum()) / precision
-    apart = float(((logs - mean) ** 2 / variances).sum())
-    log_likelihood = -0.5 * (float(np.log(variances).sum()) + math.log(precision) + apart)
-    return mean, 1.0 / precision, log_likelihood
+    part, twist = grid.T
+    differs = np.outer((plain * logs).sum(axis=1) / plain.sum(axis=1), part)
+    variances = stds[:, None, :] ** 2 + (differs**2 + twist**2)[:, :, None]
+    weights = 1.0 / variances
+    precision = weights.sum(axis=2)
+    mean = (weights * logs[:, None, :]).sum(axis=2) / precision
+    apart = (weights * (logs[:, None, :] - mean[:, :, None]) ** 2).sum(axis=2)
+    sizes = np.log(variances, out=np.zeros_like(variances), where=np.isfinite(variances))
+    return mean, 1.0 / precision, -0.5 * (sizes.sum(axis=2) + np.log(precision) + apart)
 
 
 def _of_spread(means: Floats, variances: Floats, spread: float) -> tuple[float, float, float]:

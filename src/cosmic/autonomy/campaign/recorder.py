@@ -3,7 +3,7 @@
 import math
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from threading import Lock
 from typing import Final
@@ -364,6 +364,8 @@ class FibreRecorder:
         self._events: dict[str, list[NodeEvent]] = {}
         self._begun: dict[str, HeldFibre] = {}
         self._in_work: tuple[TreatedFibre, ...] = ()
+        self._counted: tuple[tuple[FibreRecord, ...], CampaignProgress] | None = None
+        self._first_open = 1  # the number from which on records may still change
         self._surveys = 0
         self._sighted = {each.plate for each in store.reader.sightings()}
 
@@ -371,7 +373,12 @@ class FibreRecorder:
         """Return how the campaign stands; any thread."""
         now_s = self._work.clock.now_s() if self._ended_s is None else self._ended_s
         elapsed_s = self._before_s + now_s - self._began_s
-        return progress(self.fibres, elapsed_s, self.worked_off)
+        fibres, plates = self.fibres, self.worked_off
+        counted = self._counted
+        # Asked for ten times a second: of hundreds of fibres only the time is another each time.
+        if counted is None or counted[0] is not fibres or counted[1].plates != plates:
+            counted = self._counted = fibres, progress(fibres, elapsed_s, plates)
+        return replace(counted[1], elapsed_s=elapsed_s)
 
     @property
     def in_work(self) -> tuple[HeldFibre, ...]:
@@ -456,15 +463,24 @@ class FibreRecorder:
                 elapsed_s=self._before_s + fibre.found_s - self._began_s,
             )
         )
-        self._in_work = tuple(each for each in self._in_work if each is not found)
+        in_work, self._in_work = (
+            self._in_work,
+            tuple(each for each in self._in_work if each is not found),
+        )
         self._journal.fibre = None
         self._events.pop(fibre.arm, None)
         fibre.images.clear()
-        self.fibres = self.store.reader.fibres()
+        # Of hundreds only the last ones can have changed.
+        self._read_from(self._first_open)
+        self._first_open = min(each.number for each in in_work)
 
     def read_again(self) -> None:
         """Take the fibres as their final analysis has them."""
-        self.fibres = self.store.reader.fibres()
+        self._read_from(1)
+
+    def _read_from(self, first: int) -> None:
+        before = (each for each in self.fibres if each.number < first)
+        self.fibres = *before, *self.store.reader.fibres(first=first)
 
     def close(self, reason: str) -> None:
         """Write the calibrations and why the campaign ended.

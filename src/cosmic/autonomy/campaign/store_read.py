@@ -133,20 +133,26 @@ class CampaignReader:
             )
         )
 
-    def fibres(self, role: str = FIBRE) -> tuple[FibreRecord, ...]:
+    def fibres(self, role: str = FIBRE, *, first: int = 1) -> tuple[FibreRecord, ...]:
         """Return all fibres without curves and images, those in treatment included.
 
         Parameters
         ----------
         role : str
             "standard" for the measurements of the standard, which are no fibres.
+        first : int
+            Those with this number and larger ones.
         """
-        spans = self._by_fibre("SELECT * FROM span ORDER BY fibre, number")
-        steps = self._by_fibre("SELECT * FROM operation ORDER BY fibre, number")
+        spans = self._by_fibre("SELECT * FROM span WHERE fibre >= ? ORDER BY fibre, number", first)
+        steps = self._by_fibre(
+            "SELECT * FROM operation WHERE fibre >= ? ORDER BY fibre, number", first
+        )
         with self._understood():
             return tuple(
                 record
-                for row in self._rows("SELECT * FROM fibre ORDER BY number")
+                for row in self._rows(
+                    "SELECT * FROM fibre WHERE number >= ? ORDER BY number", first
+                )
                 if (
                     record := fibre_record(
                         row, spans.get(row["number"], []), steps.get(row["number"], [])
@@ -385,9 +391,9 @@ class CampaignReader:
         with self._connection() as connection:
             return [dict(row) for row in connection.execute(query, values).fetchall()]
 
-    def _by_fibre(self, query: str) -> dict[Cell, list[Row]]:
+    def _by_fibre(self, query: str, *values: Cell) -> dict[Cell, list[Row]]:
         found: dict[Cell, list[Row]] = {}
-        for row in self._rows(query):
+        for row in self._rows(query, *values):
             found.setdefault(row["fibre"], []).append(row)
         return found
 

@@ -198,6 +198,9 @@ def fit_settings(work: HandlingContext, fibre: HeldFibre) -> FitSettings:
 LEARNED_FROM: Final = 20
 """Fibres before, from which what is common to all is learned."""
 
+STANDARDS_FROM: Final = 6
+"""Measurements of the standard before: of a day on many plates the last ones tell the scale."""
+
 
 class FitSpans(FibreOperation):
     """The bending stiffness of what was measured; fails where it may not be trusted."""
@@ -216,7 +219,8 @@ class FitSpans(FibreOperation):
         before = [each for each in work.shared.finished if each.measured is not None]
         # What is common to all fibres is learned from those before; the last ones are enough.
         fibres = [each for each in before if not each.standard][-LEARNED_FROM:]
-        kept = [*fibres, *(each for each in before if each.standard), fibre]
+        standards = [each for each in before if each.standard][-STANDARDS_FROM:]
+        kept = [*fibres, *standards, fibre]
         measured = in_time(
             [each.measured for each in kept if each.measured is not None],
             [measured_s(each.spans) for each in kept],
