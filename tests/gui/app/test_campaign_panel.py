@@ -175,6 +175,23 @@ def test_start_opens_the_chosen_recipe_in_the_folder_that_is_shown(
     assert opened == [(Path("transport"), tmp_path / "here")]
 
 
+@pytest.mark.parametrize("typed", ["", "   "])
+def test_without_a_folder_nothing_begins_in_the_working_directory(
+    panel, qtbot, opened, typed: str
+) -> None:
+    panel.folder.setText(typed)
+    press(qtbot, panel.procedure.start)
+    assert opened == []
+    assert "no output folder" in panel.procedure.reason.text()
+
+
+def test_a_relative_folder_lies_where_campaigns_are_made(panel, qtbot, tmp_path, opened) -> None:
+    panel.folder.setText(" Größe ä ")
+    press(qtbot, panel.procedure.start)
+    assert opened == [(Path("quick"), tmp_path / "Größe ä")]
+    assert panel.folder.text() == str(tmp_path / "Größe ä")
+
+
 def test_one_that_was_stopped_is_shown_as_stopped_and_resume_goes_on_in_its_folder(
     panel, qtbot, tmp_path, opened
 ) -> None:

@@ -270,7 +270,14 @@ class CampaignPanel(QWidget):
         before = self._campaign
         if before is not None and before.unfinished and not self.folder.isModified():
             self._suggest_folder()  # Resume goes on in that of before; this one is new
-        return self._opened(Path(self.recipe.currentText()), Path(self.folder.text()))
+        return self._opened(Path(self.recipe.currentText()), self._chosen_folder())
+
+    def _chosen_folder(self) -> Path:
+        """Return the folder in the field; a relative one lies where campaigns are made."""
+        typed = self.folder.text().strip()
+        if not typed:
+            raise CosmicError("no output folder is named: type one, or choose it by Folder…")
+        return self._home / typed
 
     def _go_on(self) -> ProcedurePort:
         """Return the campaign that ended early, ready to go on: its recipe, in its folder."""
