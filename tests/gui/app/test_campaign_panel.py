@@ -175,6 +175,19 @@ def test_start_opens_the_chosen_recipe_in_the_folder_that_is_shown(
     assert opened == [(Path("transport"), tmp_path / "here")]
 
 
+def test_a_recipe_of_a_file_is_named_and_read_anew_at_the_start(panel, qtbot, tmp_path) -> None:
+    file = tmp_path / ("far away " * 5) / "mine.toml"
+    file.parent.mkdir()
+    file.write_text("nonsense = 1\n", encoding="utf-8")
+    panel.use_recipe(str(file))
+    assert "nonsense" in panel.about.toolTip() + panel.about.text()
+    text = 'procedure = "bend test"\ndescription = "Long ones"\n[stop]\ncount = 1\n'
+    file.write_text(f'{text}[sample]\nname = "three-dry"\n', encoding="utf-8")
+    press(qtbot, panel.procedure.start)
+    assert panel.about.text() == "mine.toml: Long ones"
+    assert str(file) in panel.recipe.toolTip()
+
+
 @pytest.mark.parametrize("typed", ["", "   "])
 def test_without_a_folder_nothing_begins_in_the_working_directory(
     panel, qtbot, opened, typed: str

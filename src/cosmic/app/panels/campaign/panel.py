@@ -24,7 +24,7 @@ from cosmic.autonomy.procedures.tree import NodeView, ProcedureTreeState
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.ask_directory import ask_directory, ask_open_file
-from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.build import named, push_button, retip, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.relay import Relay
@@ -255,8 +255,11 @@ class CampaignPanel(QWidget):
 
     def _show_about(self) -> None:
         """Say what the chosen recipe does, or what is wrong with it."""
+        chosen = Path(self.recipe.currentText())
+        retip(self.recipe, f"Recipe: how each fibre is treated\n{chosen}")
+        name = f"{chosen.name}: " if chosen.name != str(chosen) else ""  # the path is cut off
         try:
-            self.about.set_text(load_recipe(Path(self.recipe.currentText())).file.description)
+            self.about.set_text(f"{name}{load_recipe(chosen).file.description}")
         except CosmicError as exc:
             self.about.set_text(str(exc))
 
@@ -270,6 +273,7 @@ class CampaignPanel(QWidget):
         before = self._campaign
         if before is not None and before.unfinished and not self.folder.isModified():
             self._suggest_folder()  # Resume goes on in that of before; this one is new
+        self._show_about()  # the file may be another one by now
         return self._opened(Path(self.recipe.currentText()), self._chosen_folder())
 
     def _chosen_folder(self) -> Path:
