@@ -262,9 +262,11 @@ def test_a_card_of_a_failed_fibre_says_why(card: FibreCard) -> None:
 def test_a_card_says_what_is_doubtful(card: FibreCard) -> None:
     record = good(1)
     assert record.bending is not None
-    doubtful = replace(record.bending, trusted=False, reasons=("the jaws slipped",), used=(0, 1))
+    doubtful = replace(
+        record.bending, trusted=False, reasons=("the jaws slipped at 191 um",), used=(0, 1)
+    )
     card.set_card(card_of(replace(record, bending=doubtful)))
-    assert "the jaws slipped" in card.doubts.text()
+    assert "the jaws slipped at 191 µm" in card.doubts.text()
     assert any("not trusted" in text for text in _texts(card))
     assert card.curves.labels[2].toPlainText().endswith("not used")
 

@@ -51,7 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         doubtful = good(store.begin_fibre(time_s=now), began_s=now)
         assert doubtful.bending is not None
         alone = replace(
-            doubtful.bending, trusted=False, reasons=("1 good spans, and 2 are needed",)
+            doubtful.bending, trusted=False, reasons=("1 good spans, at 98 um, and 2 are needed",)
         )
         store.finish_fibre(
             replace(doubtful, outcome=Outcome.DOUBTFUL, cause="not trusted", bending=alone)
@@ -103,7 +103,7 @@ def test_what_all_fibres_share_is_as_the_command_for_the_size_of_a_sample_has_it
         "It does not show how often real jaws miss",
         "failed: jaw adhesion",
         "measured, not trusted: not trusted",
-        "1 good spans, and 2 are needed",
+        "1 good spans, at 98 µm, and 2 are needed",
         "the fibre did not follow the jaws in 4 tries",
         "0.42 µm",
         "before grasp, 2432 µm wide",

@@ -43,7 +43,7 @@ from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.palette import OKABE_ITO, ON_IMAGE, Palette
 from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
 from cosmic.frame.overrides import override
-from cosmic.frame.units import TWO_SIDED
+from cosmic.frame.units import TWO_SIDED, with_micro_signs
 
 
 class FibreImageView(QWidget):
@@ -418,7 +418,7 @@ def _words(name: str) -> QLabel:
 
 
 def _say(label: QLabel, text: str) -> None:
-    label.setText(text)
+    label.setText(with_micro_signs(text))
     label.setVisible(bool(text))
 
 
