@@ -116,10 +116,13 @@ def test_a_plate_that_is_waited_for_is_asked_for_and_confirmed(panel, qtbot, tmp
     panel.folder.setText(str(tmp_path / "plates"))
     press(qtbot, panel.procedure.start)
     assert not panel.plate.isVisibleTo(panel)
+    before = panel.tabs.pos()
     panel.campaign.request = "put plate 2 on the table, and confirm it"
     panel.refresh()
     assert panel.plate.isVisibleTo(panel)
     assert "plate 2" in panel.message.toolTip()
+    qtbot.wait(50)
+    assert panel.tabs.pos() == before
     press(qtbot, panel.plate)
     panel.refresh()
     assert panel.campaign.request == ""
@@ -267,6 +270,12 @@ def test_the_report_is_written_where_the_campaign_is(panel, qtbot, tmp_path) -> 
     qtbot.waitUntil(panel.report.isEnabled, timeout=20_000)
     assert (tmp_path / "here" / "report.html").exists()
     assert "report.html" in panel.message.toolTip() or "report.html" in panel.message.text()
+    seen: list[Path] = []
+    panel.open_file = seen.append
+    press(qtbot, panel.message)
+    assert seen == [tmp_path / "here" / "report.html"]
+    panel.show_report()
+    qtbot.waitUntil(lambda: len(seen) == 2, timeout=20_000)
 
 
 def test_a_replay_goes_from_the_first_to_the_last_position_of_every_axis() -> None:

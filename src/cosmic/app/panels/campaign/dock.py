@@ -143,7 +143,7 @@ class CampaignDock(QObject):
 
     def show_report(self) -> None:
         """Write the report of the campaign, and open it."""
-        self.panel.report.click()
+        self.panel.show_report()
 
     def _load(self) -> None:
         """Load statistics and all that the panel needs while nobody waits for it."""

@@ -24,6 +24,7 @@ from cosmic.autonomy.procedures.tree import NodeView, ProcedureTreeState
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.ask_directory import ask_directory, ask_open_file
+from cosmic.frame.gui.beside import open_with_desktop
 from cosmic.frame.gui.build import named, push_button, retip, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
@@ -161,6 +162,9 @@ class CampaignPanel(QWidget):
         self._home = folder
         self._policy = policy
         self._writing: JobQueue | None = None
+        self._written: Path | None = None
+        self._to_open = False
+        self.open_file: Callable[[Path], object] = open_with_desktop
         self._campaign: Campaign | None = None
         self._card: FibreRecord | None = None
         self._recipe = _FIRST
@@ -213,6 +217,10 @@ class CampaignPanel(QWidget):
         whole.addWidget(self.message)
         whole.addWidget(self.tabs, 1)
         whole.addWidget(self.procedure.buttons)  # whichever page is in front
+        room = self.message.sizePolicy()
+        room.setRetainSizeWhenHidden(True)  # what is below stays where it is clicked
+        self.message.setSizePolicy(room)
+        self.message.setFixedHeight(self.message.fontMetrics().height() + STEP_PX // 2)
         self.message.hide()
 
     def _connect(self) -> None:
@@ -220,6 +228,7 @@ class CampaignPanel(QWidget):
         self.choose.clicked.connect(self._on_choose)
         self.report.clicked.connect(self.write_report)
         self.plate.clicked.connect(self.confirm_plate)
+        self.message.clicked.connect(self._open_written)
         self.procedure.refused.connect(lambda: self.tabs.setCurrentWidget(self.procedure))
         self.card.replay_requested.connect(self._on_replay)
         self.board.fibre_chosen.connect(self.show_fibre)
@@ -384,11 +393,24 @@ class CampaignPanel(QWidget):
         written.add_callback(self._written_relay)
         self.refresh()
 
+    def show_report(self) -> None:
+        """Begin to write the report, and open it when it is written; returns at once."""
+        self._to_open = self._campaign is not None
+        self.write_report()
+
+    def _open_written(self) -> None:
+        if self._written is not None:
+            self.open_file(self._written)
+
     def _on_written(self, written: Operation[list[Path]]) -> None:
         self._end_writing()
+        to_open, self._to_open = self._to_open, False
         if written.failure is None:
             files = ", ".join(str(each) for each in written.result)
-            self._say(f"written: {files}", State.OK)
+            self._say(f"written, a click opens it: {files}", State.OK)
+            self._written = next(iter(written.result), None)
+            if to_open:
+                self._open_written()
         else:
             self._say(str(written.failure))
         self.refresh()
@@ -400,6 +422,7 @@ class CampaignPanel(QWidget):
             writing.join()
 
     def _say(self, text: str, state: State = State.REFUSED) -> None:
+        self._written = None  # the line tells of something else now
         self.message.set_text(f"{state_look(state).glyph} {text}" if text else "")
         self.message.setVisible(bool(text))
 
