@@ -6,6 +6,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import Event
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -216,6 +217,19 @@ def test_a_second_tare_before_new_samples_came_finds_zero(rig: DaqcoRig) -> None
     rig.home.application.stop_acquisition()  # so that none come
     rig.daqco.tare("force")
     assert rig.daqco.tare("force") == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_tare_takes_no_value_of_long_ago(rig: DaqcoRig, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert wait_until(lambda: rig.daqco.latest_chunk is not None)
+    rig.home.application.stop_acquisition()
+    before = rig.daqco.scales["force"]
+    newest = rig.daqco.latest_chunk
+    assert newest is not None
+    later = SimpleNamespace(now_s=lambda: newest.end_time_s + 6.0, rate=1.0)
+    monkeypatch.setattr(rig.home.application, "clock", later)
+    with pytest.raises(NotAvailable, match="no zero of now"):
+        rig.daqco.tare("force")
+    assert rig.daqco.scales["force"] == before
 
 
 def test_recordings_are_listed_beside_a_link_that_leads_nowhere(rig: DaqcoRig) -> None:

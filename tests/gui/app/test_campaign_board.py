@@ -15,7 +15,13 @@ from cosmic.app.panels.campaign.board import CampaignBoard
 from cosmic.app.panels.campaign.fibre_card import FibreCard, round_below
 from cosmic.app.panels.campaign.table import CAUSE, EI, INTERVAL, NUMBER, OUTCOME, TIME
 from cosmic.autonomy.campaign.records import FibreImage, FibreRecord, Outcome, Shape
-from cosmic.autonomy.campaign.snapshot import CampaignSnapshot, FibreRow, card_of, snapshot_of
+from cosmic.autonomy.campaign.snapshot import (
+    CampaignSnapshot,
+    FibreRow,
+    SpanCurve,
+    card_of,
+    snapshot_of,
+)
 from cosmic.autonomy.campaign.statistics import progress
 from cosmic.frame.gui.palette import LIGHT
 from cosmic.frame.gui.theme import State, apply_theme
@@ -200,6 +206,32 @@ def test_what_was_measured_is_seen_without_scrolling(
         qtbot.waitUntil(lambda seen=widget: _all_seen(seen, card), timeout=2_000)
 
 
+@pytest.mark.parametrize("width", [800, 400])
+def test_no_place_of_a_span_is_written_over_another(
+    card: FibreCard, qtbot: QtBot, width: int
+) -> None:
+    push_um = np.array([-90.0, 0.0, 1.0])
+    loading = np.array([True, True, True])
+    curves = [
+        SpanCurve(
+            place_um=100.0 + 7.0 * number,
+            used=number > 0,
+            probe_um=push_um * (1.0 + 0.5 * number),
+            force_un=np.array([0.0, 0.0, 70.0 - number]),
+            fitted_un=np.array([0.0, 0.0, 70.0 - number]),
+            loading=loading,
+        )
+        for number in range(5)
+    ]
+    card.set_card(card_of(good(1)))
+    card.curves.show_curves(curves)
+    card.curves.resize(width, 240)
+    qtbot.wait(100)
+    places = [each.mapRectToScene(each.boundingRect()) for each in card.curves.labels]
+    for number, place in enumerate(places):
+        assert not any(place.intersects(other) for other in places[:number]), number
+
+
 def _all_seen(widget: QWidget, card: FibreCard) -> bool:
     place = QRect(widget.mapTo(card, QPoint()), widget.size())
     return widget.isVisible() and card.rect().contains(place)
@@ -230,9 +262,11 @@ def test_a_card_of_a_failed_fibre_says_why(card: FibreCard) -> None:
 def test_a_card_says_what_is_doubtful(card: FibreCard) -> None:
     record = good(1)
     assert record.bending is not None
-    doubtful = replace(record.bending, trusted=False, reasons=("the jaws slipped",), used=(0, 1))
+    doubtful = replace(
+        record.bending, trusted=False, reasons=("the jaws slipped at 191 um",), used=(0, 1)
+    )
     card.set_card(card_of(replace(record, bending=doubtful)))
-    assert "the jaws slipped" in card.doubts.text()
+    assert "the jaws slipped at 191 µm" in card.doubts.text()
     assert any("not trusted" in text for text in _texts(card))
     assert card.curves.labels[2].toPlainText().endswith("not used")
 

@@ -116,10 +116,13 @@ def test_a_plate_that_is_waited_for_is_asked_for_and_confirmed(panel, qtbot, tmp
     panel.folder.setText(str(tmp_path / "plates"))
     press(qtbot, panel.procedure.start)
     assert not panel.plate.isVisibleTo(panel)
+    before = panel.tabs.pos()
     panel.campaign.request = "put plate 2 on the table, and confirm it"
     panel.refresh()
     assert panel.plate.isVisibleTo(panel)
     assert "plate 2" in panel.message.toolTip()
+    qtbot.wait(50)
+    assert panel.tabs.pos() == before
     press(qtbot, panel.plate)
     panel.refresh()
     assert panel.campaign.request == ""
@@ -173,6 +176,36 @@ def test_start_opens_the_chosen_recipe_in_the_folder_that_is_shown(
     panel.folder.setText(str(tmp_path / "here"))
     press(qtbot, panel.procedure.start)
     assert opened == [(Path("transport"), tmp_path / "here")]
+
+
+def test_a_recipe_of_a_file_is_named_and_read_anew_at_the_start(panel, qtbot, tmp_path) -> None:
+    file = tmp_path / ("far away " * 5) / "mine.toml"
+    file.parent.mkdir()
+    file.write_text("nonsense = 1\n", encoding="utf-8")
+    panel.use_recipe(str(file))
+    assert "nonsense" in panel.about.toolTip() + panel.about.text()
+    text = 'procedure = "bend test"\ndescription = "Long ones"\n[stop]\ncount = 1\n'
+    file.write_text(f'{text}[sample]\nname = "three-dry"\n', encoding="utf-8")
+    press(qtbot, panel.procedure.start)
+    assert panel.about.text() == "mine.toml: Long ones"
+    assert str(file) in panel.recipe.toolTip()
+
+
+@pytest.mark.parametrize("typed", ["", "   "])
+def test_without_a_folder_nothing_begins_in_the_working_directory(
+    panel, qtbot, opened, typed: str
+) -> None:
+    panel.folder.setText(typed)
+    press(qtbot, panel.procedure.start)
+    assert opened == []
+    assert "no output folder" in panel.procedure.reason.text()
+
+
+def test_a_relative_folder_lies_where_campaigns_are_made(panel, qtbot, tmp_path, opened) -> None:
+    panel.folder.setText(" Größe ä ")
+    press(qtbot, panel.procedure.start)
+    assert opened == [(Path("quick"), tmp_path / "Größe ä")]
+    assert panel.folder.text() == str(tmp_path / "Größe ä")
 
 
 def test_one_that_was_stopped_is_shown_as_stopped_and_resume_goes_on_in_its_folder(
@@ -237,6 +270,12 @@ def test_the_report_is_written_where_the_campaign_is(panel, qtbot, tmp_path) -> 
     qtbot.waitUntil(panel.report.isEnabled, timeout=20_000)
     assert (tmp_path / "here" / "report.html").exists()
     assert "report.html" in panel.message.toolTip() or "report.html" in panel.message.text()
+    seen: list[Path] = []
+    panel.open_file = seen.append
+    press(qtbot, panel.message)
+    assert seen == [tmp_path / "here" / "report.html"]
+    panel.show_report()
+    qtbot.waitUntil(lambda: len(seen) == 2, timeout=20_000)
 
 
 def test_a_replay_goes_from_the_first_to_the_last_position_of_every_axis() -> None:

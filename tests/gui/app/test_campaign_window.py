@@ -106,7 +106,7 @@ def wait_for_listing(window: OperatorWindow, qtbot: QtBot, folder: Path) -> None
 
 
 def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
-    make: Make, qtbot: QtBot, tmp_path: Path
+    make: Make, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     window = make(whole_platform())
     assert window.tasks is not None
@@ -137,6 +137,15 @@ def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: words.text().startswith("A campaign runs"), timeout=10_000)
     assert "a campaign is running" in mico(window).undoing.doubt()
+    asked = ["put plate 2 on the table, and confirm it"]
+    with monkeypatch.context() as patch:
+        patch.setattr(Campaign, "request", property(lambda campaign: "".join(asked)))
+        patch.setattr(Campaign, "confirm_plate", lambda campaign: asked.clear())
+        qtbot.waitUntil(lambda: button.text() == "Plate is there", timeout=10_000)
+        assert "waits for a person: put plate 2" in words.text()
+        qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+        assert not asked
+        qtbot.waitUntil(lambda: words.text().startswith("A campaign runs"), timeout=10_000)
     window.stop("a hand on the button")
     qtbot.waitUntil(lambda: campaign.over, timeout=30_000)
     qtbot.waitUntil(lambda: panel.board.state.text() == "stopped", timeout=5_000)

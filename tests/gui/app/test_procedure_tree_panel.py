@@ -162,6 +162,20 @@ def test_tries_times_and_causes_are_shown(panel: ProcedureTreePanel, qtbot: QtBo
     assert "nothing between the jaws" in item.toolTip(CAUSE)
 
 
+def test_a_tree_of_other_parts_takes_the_place_of_the_one_before(
+    panel: ProcedureTreePanel,
+) -> None:
+    fibre = run_of(Sequence("fibre", Op("find"), Op("grasp")), Work())
+    standard = run_of(Sequence("standard", Op("take"), Sequence("bend", Op("push"))), Work())
+    panel.follow(fibre)
+    panel.tree.show_view(standard.tree)
+    assert panel.tree.row((1, 0))[PART] == "push"
+    assert panel.tree.topLevelItem(0).text(PART) == "standard"
+    panel.tree.show_view(fibre.tree)
+    assert panel.tree.row((1,))[PART] == "grasp"
+    assert panel.tree.topLevelItemCount() == 1
+
+
 def test_why_it_failed_stays_in_the_panel(panel: ProcedureTreePanel, qtbot: QtBot) -> None:
     panel.follow(timed(Op("close", fails_in="run")))
     click(qtbot, panel.start)

@@ -18,6 +18,7 @@ from cosmic.autonomy.calibrating.force_scale import (
     ForceCalibration,
     ForceScaleResult,
     RestingForce,
+    reach_of,
     weight,
 )
 from cosmic.autonomy.campaign.formatting import scale_words
@@ -56,15 +57,21 @@ def run(chosen: argparse.Namespace) -> int:
         with chosen_rig(chosen) as rig:
             return by_beam(rig, chosen.beam, chosen.expanded_percent, chosen.rounds or BENDS)
     loads = [weight(each, chosen.expanded_percent) for each in chosen.weights]
-    calibration = ForceCalibration(loads, chosen.rounds or ROUNDS)
     if chosen.out is not None and (chosen.out.is_dir() or not chosen.out.parent.is_dir()):
         raise ConfigError(f"--out {chosen.out}: name a file in a folder that there is")
     with chosen_rig(chosen) as rig:
         before = rig.daqco.scales[checked_channel(rig.daqco, chosen.channel)]
+        reach = reach_of(rig.daqco, chosen.channel)
+        calibration = ForceCalibration(loads, chosen.rounds or ROUNDS, reach)
         found = lead(calibration, rig.daqco, chosen.channel, _ask(sys.stdin, sys.stdout))
         if found is None:
             sys.stderr.write("ended; nothing was changed\n")
             return NOT_VERIFIED
+        if rig.daqco.scales.get(chosen.channel) != before:
+            raise CalibrationProblem(
+                f"the scale of {chosen.channel} was changed while weights were read: the readings "
+                "do not fit together. Begin anew"
+            )
         for line in lines_of(found, before):
             sys.stdout.write(f"{line}\n")
         if chosen.out is not None:

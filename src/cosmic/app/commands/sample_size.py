@@ -5,6 +5,8 @@ import math
 import sys
 from typing import Final
 
+from scipy.special import chdtri  # scipy.stats takes a second to load
+
 from cosmic.autonomy.campaign.statistics import MeanEi, fibres_needed, progress
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.errors import ConfigError
@@ -24,6 +26,8 @@ def run(chosen: argparse.Namespace) -> int:
     mean, seen_part = _basis(chosen)
     for line in lines_of(mean, (chosen.precision,) if chosen.precision else USUAL, seen_part):
         sys.stdout.write(f"{line}\n")
+    if chosen.spread is None:
+        sys.stdout.write(f"{doubt_of(mean)}\n")
     return 0
 
 
@@ -46,6 +50,18 @@ def _basis(chosen: argparse.Namespace) -> tuple[MeanEi, float]:
             "fibres, or give --spread, the standard deviation of ln(EI), such as 0.56"
         )
     return MeanEi(max(mean.count, 2), mean.ei_n_m2, math.nan, math.nan, spread, shared), part
+
+
+def doubt_of(mean: MeanEi) -> str:
+    """Return how far the spread itself is known, by how many fibres it was found from."""
+    free = mean.count - 1
+    low, high = (
+        mean.spread_ln * math.sqrt(free / float(chdtri(free, above))) for above in (0.025, 0.975)
+    )
+    return (
+        f"the spread is that of {mean.count} fibres: it may be {low:.2f} to {high:.2f} (95 %), and "
+        "the numbers of fibres with it; ask again when there are more"
+    )
 
 
 def lines_of(mean: MeanEi, wanted_percent: tuple[float, ...], good_part: float) -> list[str]:

@@ -27,6 +27,7 @@ from cosmic.app.panels.calculated import CalculatedCurve, Calculation
 from cosmic.app.panels.force_analysis import LowPass, RecentValues, SpectrumCurve
 from cosmic.app.panels.force_calibration import ForceCalibrationDialog
 from cosmic.app.panels.force_curves import AXIS_PX, LimitBar, PositionCurve
+from cosmic.autonomy.calibrating.force_scale import reach_of
 from cosmic.daqco.api.daqco import Daqco, DaqLimit
 from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.core.chunk import DataChunk
@@ -84,6 +85,8 @@ class ForcePanel(QWidget):
         Whose axes the curve is drawn over.
     folder : callable
         Returns the folder of this session's files.
+    running : callable, optional
+        Names the campaign or procedure that runs; "" where none does.
 
     Signals
     -------
@@ -99,10 +102,13 @@ class ForcePanel(QWidget):
         gui: MicoWidget,
         folder: Callable[[], Path],
         parent: QWidget | None = None,
+        *,
+        running: Callable[[], str] = str,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("forcePanel")
         self._daqco, self._gui, self._folder = daqco, gui, folder
+        self._running = running
         self._inbox = ChunkInbox()
         self._ranges = UnitRanges()
         self._key: object = None
@@ -485,15 +491,32 @@ class ForcePanel(QWidget):
         if self._daqco.remote:
             self._say("calibrate where the boards are", refused=True)
             return
-        dialog = ForceCalibrationDialog(self._daqco, self._channel, self)
+        try:
+            reach_of(self._daqco, self._channel)
+        except CosmicError as exc:
+            self._say(str(exc), refused=True)
+            return
+        if self._is_measuring():
+            return
+        dialog = ForceCalibrationDialog(self._daqco, self._channel, self, running=self._running)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         open_beside(dialog)
+
+    def _is_measuring(self) -> bool:
+        """Tell whether something runs whose forces are read by this scale, and say so."""
+        what = self._running()
+        if what:
+            text = f"{what} measures with this scale: end it first"
+            self._say(text, f"{what} measures: end it first", "end what runs first", refused=True)
+        return bool(what)
 
     def take_zero(self) -> None:
         """Call the present force zero, by another scale; refused while the sensor is loaded."""
         value, limit = self._mean(), self._limit_in_force()
         if not self._daqco.running:
             self._say("start the acquisition first", refused=True)
+            return
+        if self._is_measuring():
             return
         if limit is not None and limit.settings.armed:
             text = "the armed limit watches this zero: disarm it first, by Limit…"

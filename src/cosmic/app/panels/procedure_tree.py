@@ -53,6 +53,10 @@ class _Shown:
     time: str
 
 
+_Outline = tuple[tuple[Path, str, str], ...]
+"""Where each part stands, its name and its kind."""
+
+
 class ProcedureTree(QTreeWidget):
     """Shows a `NodeView`; GUI thread."""
 
@@ -74,6 +78,7 @@ class ProcedureTree(QTreeWidget):
         header.setSectionsMovable(False)
         header.setSectionResizeMode(PART, QHeaderView.ResizeMode.Interactive)
         self._items: dict[Path, QTreeWidgetItem] = {}
+        self._outline: _Outline = ()
         self._shown: dict[Path, _Shown] = {}
         self._front: Path | None = None
         self._icons: dict[NodeState, QIcon] = {}
@@ -84,6 +89,7 @@ class ProcedureTree(QTreeWidget):
         self._items.clear()
         self._shown.clear()
         self._front = None
+        self._outline = _outline(view)
         self._add(view, self.invisibleRootItem())
         self.expandAll()
         self._fit()
@@ -111,7 +117,14 @@ class ProcedureTree(QTreeWidget):
         self.setColumnWidth(TIME, metrics.horizontalAdvance("00 min 00 s") + INDICATOR_PX)
 
     def show_view(self, view: NodeView) -> None:
-        """Show what the parts are at now; only what changed is written anew."""
+        """Show what the parts are at now; only what changed is written anew.
+
+        A tree of other parts takes the place of the one that was laid out: a campaign has one for
+        fibres and another one for its standard.
+        """
+        if _outline(view) != self._outline:
+            self.lay_out(view)
+            return
         front: Path | None = None
         for each in view.walk():
             path = each.event.path
@@ -163,6 +176,10 @@ class ProcedureTree(QTreeWidget):
         if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_icons"):
             self._icons.clear()
             self._shown.clear()  # all is written anew, in the new colours, when it is shown next
+
+
+def _outline(view: NodeView) -> _Outline:
+    return tuple((each.event.path, each.name, each.kind) for each in view.walk())
 
 
 def _count(view: NodeView) -> str:

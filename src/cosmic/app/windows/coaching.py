@@ -130,6 +130,9 @@ class _Rules:
         """Look whether a campaign works: what seems to be missing then is its own business."""
         if self._rig.running != A_CAMPAIGN:
             return None
+        if self._dock is not None and self._dock.request:
+            text = f"The campaign waits for a person: {self._dock.request}."
+            return Step(text, "Plate is there", self._dock.confirm_plate)
         if self._dock is not None and self._dock.paused:
             text = "The campaign is paused and does nothing until Resume. Abort ends it safely."
             return Step(text, "Resume", self._dock.resume)

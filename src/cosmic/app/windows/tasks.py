@@ -187,7 +187,7 @@ class TaskLayout(QObject):
             self.recorder = LatePanel(self._make_recorder)
             self.tool.offer_gently()
             self.tool.close_gently_requested.connect(self.operations.close_gently)
-        self.force = ForcePanel(rig.daqco, gui, self.folder) if instruments.force else None
+        self.force = self._force_panel(rig, gui) if instruments.force else None
         self.results = ResultsPanel(self._folders, platform.policy, self._model)
         self.first_day = FirstDayPanel(self._day_steps())
         self.book = AlarmBook(self)
@@ -211,6 +211,9 @@ class TaskLayout(QObject):
         for parts in self._parts.values():
             if not parts.recorder.files.remote:
                 parts.recorder.files.keep_in(self.folder.path, self.folder)
+
+    def _force_panel(self, rig: Rig, gui: MicoWidget) -> ForcePanel:
+        return ForcePanel(rig.daqco, gui, self.folder, running=lambda: rig.running)
 
     def _add_panels(self) -> None:
         self._keep_images()

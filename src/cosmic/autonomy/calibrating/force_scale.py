@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from cosmic.autonomy.handling.force import ForceWatch
+from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.errors import CosmicError
 
@@ -20,6 +21,14 @@ CLEAR: Final = 5.0
 
 MOST_OFF: Final = 0.3
 """A scale that is further off means another load, another unit or a broken sensor."""
+
+LEFT_ON: Final = 0.3
+"""Of the smallest load: a zero that changed by more means that something is still there."""
+
+MOST_PERCENT: Final = 50.0
+"""Expanded uncertainty of masses at which they say nothing."""
+
+FORCE_UNIT: Final = "uN"
 
 NOT_STRAIGHT: Final = 0.02
 """Departure from a straight line, of the largest load, that is reported."""
@@ -54,9 +63,57 @@ class KnownLoad:
 
 
 def weight(mass_mg: float, expanded_percent: float) -> KnownLoad:
-    """Return the load of a weight with the expanded uncertainty (k = 2) of its mass."""
+    """Return the load of a weight with the expanded uncertainty (k = 2) of its mass.
+
+    Raises
+    ------
+    CalibrationProblem
+        The uncertainty is none.
+    """
+    if not 0.0 <= expanded_percent < MOST_PERCENT:
+        raise CalibrationProblem(
+            f"{expanded_percent:g} % is no uncertainty of a mass: give 0 to below "
+            f"{MOST_PERCENT:g} %"
+        )
     std = math.hypot(expanded_percent / 200.0, GRAVITY_STD_PART)
     return KnownLoad(f"the weight of {mass_mg:g} mg", mass_mg * UN_PER_MG, std)
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """The largest force that a channel may be given, either sign, and what sets it."""
+
+    largest_un: float
+    words: str
+
+
+def reach_of(daqco: Daqco, channel: str) -> Reach:
+    """Return how far a force channel goes: to the end of its input, or to its limit if nearer.
+
+    The limit counts while it is disarmed too: it stands for what the sensor bears.
+
+    Raises
+    ------
+    CalibrationProblem
+        There is no such channel, or it is none of a force in µN.
+    """
+    settings = next((each for each in daqco.settings.channel if each.name == channel), None)
+    if settings is None or channel not in daqco.channels:
+        raise CalibrationProblem(f"there is no channel {channel!r} to calibrate")
+    scale = daqco.scales[channel]
+    if scale.unit != FORCE_UNIT:
+        raise CalibrationProblem(
+            f"{channel} reads {scale.unit}: give it a scale in µN, and calibrate then"
+        )
+    ends = np.abs(scale.apply([settings.low_v, settings.high_v]))
+    reach = Reach(float(ends.max()), "its input ends there")
+    for each in daqco.limits:
+        if each.settings.channel == channel:
+            sides = (each.settings.low, each.settings.high)
+            nearest = min(abs(side) for side in sides if side is not None)
+            if nearest < reach.largest_un:
+                reach = Reach(nearest, "its limit lies there")
+    return reach
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +164,8 @@ class ForceScaleResult:
             f"not straight by {100.0 * self.linearity_part:.2f} %, up and down differ by "
             f"{100.0 * self.hysteresis_part:.2f} % of the largest load"
         )
+        if len({each.load.force_un for each in self.readings if each.load is not None}) < 2:
+            text += "; one load does not show whether it is straight: use another one too"
         if max(self.linearity_part, self.hysteresis_part) > NOT_STRAIGHT:
             text += "; that is much: look for something that touches, and repeat"
         return text
@@ -148,11 +207,21 @@ class ForceCalibration:
         At least one.
     rounds : int
         How often all of them are read.
+    reach : Reach, optional
+        No load may be larger.
     """
 
-    def __init__(self, loads: Sequence[KnownLoad], rounds: int = 2) -> None:
+    def __init__(
+        self, loads: Sequence[KnownLoad], rounds: int = 2, reach: Reach | None = None
+    ) -> None:
         if not loads or any(not 0.0 < each.force_un < math.inf for each in loads):
-            raise CalibrationProblem("name at least one load, each above zero")
+            raise CalibrationProblem("name at least one load, each above zero and finite")
+        for each in loads:
+            if reach is not None and not each.force_un <= reach.largest_un:
+                raise CalibrationProblem(
+                    f"{each.words} is {each.force_un:.4g} µN, and the channel goes to "
+                    f"{reach.largest_un:.4g} µN, as {reach.words}: take lighter ones"
+                )
         if any(not 0.0 < each.std_part < 1.0 for each in loads):
             raise CalibrationProblem("the uncertainty of a load is above 0 and below 100 %")
         if rounds < 1:
@@ -202,7 +271,7 @@ class ForceCalibration:
         Raises
         ------
         CalibrationProblem
-            All were taken, or the load is not to be seen: it is to be read again.
+            All were taken, or what is read is not the load asked for: it is to be read again.
         """
         if self.done:
             raise CalibrationProblem("all readings were taken")
@@ -210,12 +279,33 @@ class ForceCalibration:
             raise CalibrationProblem("no force was read: start the acquisition, and read again")
         load = self._steps[len(self._readings)]
         zero = next((e.read_un for e in reversed(self._readings) if e.load is None), read_un)
-        if load is not None and not abs(read_un - zero) > max(CLEAR * std_un, 0.3 * load.force_un):
+        if load is not None:
+            self._check_load(load, read_un - zero, std_un)
+        else:
+            self._check_nothing(read_un - zero, std_un)
+        self._readings.append(LoadReading(load, read_un, std_un))
+
+    def _check_load(self, load: KnownLoad, above_un: float, std_un: float) -> None:
+        if not abs(above_un) > max(CLEAR * std_un, 0.3 * load.force_un):
             raise CalibrationProblem(
-                f"{load.words} is not to be seen: {read_un - zero:+.2f} µN instead of "
+                f"{load.words} is not to be seen: {above_un:+.2f} µN instead of "
                 f"{load.force_un:.2f} µN. Put it there, and read again"
             )
-        self._readings.append(LoadReading(load, read_un, std_un))
+        if not abs(abs(above_un) - load.force_un) <= MOST_OFF * load.force_un + CLEAR * std_un:
+            raise CalibrationProblem(
+                f"{above_un:+.2f} µN is read instead of {load.force_un:.2f} µN of {load.words}: "
+                "another load, another unit, or a broken sensor. Nothing was changed: put it "
+                "there, and read again"
+            )
+
+    def _check_nothing(self, above_un: float, std_un: float) -> None:
+        smallest = min(each.force_un for each in self._steps if each is not None)
+        if not abs(above_un) <= max(CLEAR * std_un, LEFT_ON * smallest):
+            raise CalibrationProblem(
+                f"{above_un:+.2f} µN more than without a load before: take everything off, and "
+                "read again. Where it stays so, something touches or the sensor was moved: begin "
+                "anew"
+            )
 
     def undo(self) -> None:
         """Take the last reading back; without effect before the first."""
@@ -258,14 +348,25 @@ class ForceCalibration:
         bent = [float(left[force == each].mean()) for each in kinds]
         branches = [float(np.ptp(left[force == each])) for each in kinds]
         linearity = max(map(abs, bent)) / largest
+        bow = self._bow(gain, left, force, noise)
         # Weights of one set come from one balance: their errors are taken to be the same.
         loads = max(each.load.std_part for each in self._readings if each.load is not None)
         return ForceScaleResult(
             gain=gain,
-            gain_std_part=math.sqrt(scatter**2 + loads**2 + linearity**2 / 3.0),
+            gain_std_part=math.sqrt(scatter**2 + loads**2 + bow**2 / 3.0),
             scatter_part=scatter,
             loads_part=loads,
             linearity_part=linearity,
             hysteresis_part=max(branches) / largest,
             readings=self.readings,
         )
+
+    @staticmethod
+    def _bow(gain: float, left: np.ndarray, force: np.ndarray, noise: float) -> float:
+        """Return by how much the gain of one load differs from that of all, noise taken off."""
+        found = 0.0
+        for kind in np.unique(force):
+            mine = left[force == kind]
+            excess = float(mine.mean()) ** 2 - noise**2 / len(mine)
+            found = max(found, math.sqrt(max(0.0, excess)) / (gain * float(kind)))
+        return found

@@ -72,7 +72,7 @@ from cosmic.autonomy.campaign.statistics import (
 from cosmic.autonomy.campaign.store import CampaignStore, write_whole
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.campaign.svg_plot import bars
-from cosmic.frame.units import TWO_SIDED
+from cosmic.frame.units import TWO_SIDED, with_micro_signs
 
 ShowSvg = Callable[[str, int], str]
 """Returns the element that shows an SVG, so many pixels wide."""
@@ -195,6 +195,7 @@ def _templates() -> Environment:
     )
     environment.globals |= {
         "TWIN": TWIN,
+        "with_micro_signs": with_micro_signs,
         "EI_LABEL": EI_LABEL,
         "interval": interval,
         "outcome_words": outcome_words,

@@ -71,6 +71,10 @@ class DaqCounters:
     backlog: int
 
 
+NO_ZERO_S: Final = 5.0
+"""A value as old as that is not called zero once acquisition has ended."""
+
+
 @dataclass(frozen=True, slots=True)
 class DaqLimit:
     """A limit and whether it was crossed."""
@@ -349,21 +353,32 @@ class Daqco(Declared):
         Raises
         ------
         NotAvailable
-            Nothing has been acquired yet, or not this channel.
+            Nothing has been acquired yet, not this channel, or nothing for some seconds.
         """
         chunk = self.latest_chunk
         if chunk is None or channel not in chunk.channels:
             raise NotAvailable(self.problem or f"{channel}: nothing has been acquired yet")
+        age_s = self._application.clock.now_s() - chunk.end_time_s
+        if not self.running and age_s > NO_ZERO_S:
+            raise NotAvailable(
+                f"{channel}: {self.problem or 'acquisition is stopped'}; a value of {age_s:.1f} s "
+                "ago is no zero of now. Start the acquisition, and tare again"
+            )
         # By the scale in force: the newest samples may have come before a tare just now.
         scale = self.scales[channel]
         value = float(scale.apply(chunk.volts[chunk.channels.index(channel)]).mean())
         first, *rest = scale.coefficients
-        name = scale.name
+        own = self.own_scale_name(channel)
+        self.set_scale(channel, Scale(own, scale.unit, (first - value, *rest)))
+        return value
+
+    def own_scale_name(self, channel: str) -> str:
+        """Return the name of a channel's scale, or another one where other channels have that."""
+        name = self.scales[channel].name
         taken = {each.scale for each in self.settings.channel if each.name != channel}
         while name in taken:
             name = f"{name} ({channel})"
-        self.set_scale(channel, Scale(name, scale.unit, (first - value, *rest)))
-        return value
+        return name
 
     # Recording
 

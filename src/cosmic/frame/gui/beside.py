@@ -1,6 +1,15 @@
-"""How a dialog opens: beside its window, whose STOP can be clicked meanwhile."""
+"""How dialogs and files open: beside the window, whose STOP can be clicked meanwhile."""
 
+from pathlib import Path
+
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QDialog, QMessageBox, QWidget
+
+
+def open_with_desktop(path: Path) -> None:
+    """Open a file with the program that the desktop has for it."""
+    QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
 
 
 def open_beside(dialog: QDialog) -> None:

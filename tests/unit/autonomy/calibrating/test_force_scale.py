@@ -1,6 +1,8 @@
 """A channel is calibrated against known loads, step by step."""
 
 import math
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -9,9 +11,12 @@ from cosmic.autonomy.calibrating.force_scale import (
     CalibrationProblem,
     ForceCalibration,
     KnownLoad,
+    reach_of,
     weight,
 )
+from cosmic.daqco.api.daqco import Daqco, DaqLimit
 from cosmic.daqco.core.scale import Scale
+from cosmic.daqco.core.settings import ChannelSettings, LimitSettings
 
 NOISE_UN = 0.05
 
@@ -127,3 +132,75 @@ def test_a_bent_characteristic_widens_the_interval() -> None:
     bent = calibration.result()
     assert bent.linearity_part > 2.0 * straight.linearity_part
     assert bent.gain_std_part > straight.gain_std_part
+
+
+@pytest.mark.parametrize("percent", [-1.0, 50.0, math.nan, math.inf])
+def test_an_uncertainty_that_is_none_is_refused(percent: float) -> None:
+    with pytest.raises(CalibrationProblem, match="no uncertainty"):
+        weight(1.0, percent)
+
+
+def test_another_weight_is_noticed_at_once() -> None:
+    calibration = ForceCalibration([weight(2.0, 1.0), weight(5.0, 1.0)])
+    calibration.take(1.0, 0.05)
+    with pytest.raises(CalibrationProblem, match=r"\+49\.00 µN is read instead of 19\.61 µN"):
+        calibration.take(50.0, 0.05)
+    calibration.take(20.6, 0.05)
+    assert len(calibration.readings) == 2
+
+
+def test_a_weight_that_was_left_on_the_sensor_is_noticed() -> None:
+    calibration = ForceCalibration([weight(2.0, 1.0), weight(5.0, 1.0)], rounds=1)
+    for read in (1.0, 20.6, 50.0, 50.1, 20.7):
+        calibration.take(read, 0.05)
+    with pytest.raises(CalibrationProblem, match="take everything off"):
+        calibration.take(20.7, 0.05)
+    calibration.take(1.2, 0.05)
+    assert calibration.done
+
+
+def test_a_sensor_that_ends_below_the_largest_load_is_not_taken_for_sure() -> None:
+    loads = [weight(each, 0.5) for each in (1.0, 2.0, 5.0, 20.0)]
+    calibration, sensor = ForceCalibration(loads), Sensor(1.0, seed=4)
+    while not calibration.done:
+        calibration.take(min(sensor.read(calibration.instruction, loads), 180.0), NOISE_UN)
+    found = calibration.result()
+    assert abs(found.gain - 1.0) <= 2.0 * found.gain_std_part
+    assert "look for something that touches" in found.words
+
+
+def test_one_load_is_said_not_to_show_a_straight_line() -> None:
+    one, two = [weight(5.0, 1.0)], [weight(5.0, 1.0), weight(2.0, 1.0)]
+    assert "use another one too" in carried_out(Sensor(1.0, seed=1), one).result().words
+    assert "use another one too" not in carried_out(Sensor(1.0, seed=1), two).result().words
+
+
+def channel_of(unit: str = "uN", limit: LimitSettings | None = None) -> Daqco:
+    settings = ChannelSettings(
+        name="force", board="Dev1", input="ai0", low_v=0.0, high_v=5.0, colour="#E69F00"
+    )
+    limits = () if limit is None else (DaqLimit(limit, False, None, None, ""),)
+    there = SimpleNamespace(
+        channels=["force"],
+        settings=SimpleNamespace(channel=(settings,)),
+        scales={"force": Scale("sensor", unit, (-250.0, 100.0))},
+        limits=limits,
+    )
+    return cast("Daqco", there)
+
+
+def test_no_load_is_beyond_the_input_or_the_limit_of_the_channel() -> None:
+    assert reach_of(channel_of(), "force").largest_un == pytest.approx(250.0)
+    limit = LimitSettings(channel="force", low=-150.0, high=160.0)
+    reach = reach_of(channel_of(limit=limit), "force")
+    assert reach.largest_un == 150.0
+    with pytest.raises(CalibrationProblem, match=r"goes to 150 µN, as its limit.*lighter"):
+        ForceCalibration([weight(1.0, 1.0), weight(16.0, 1.0)], reach=reach)
+    assert ForceCalibration([weight(15.0, 1.0)], reach=reach).count == 7
+
+
+def test_a_channel_that_reads_no_force_is_not_calibrated() -> None:
+    with pytest.raises(CalibrationProblem, match="reads V"):
+        reach_of(channel_of("V"), "force")
+    with pytest.raises(CalibrationProblem, match="no channel 'aux'"):
+        reach_of(channel_of(), "aux")

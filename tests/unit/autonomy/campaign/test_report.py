@@ -51,7 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         doubtful = good(store.begin_fibre(time_s=now), began_s=now)
         assert doubtful.bending is not None
         alone = replace(
-            doubtful.bending, trusted=False, reasons=("1 good spans, and 2 are needed",)
+            doubtful.bending, trusted=False, reasons=("1 good spans, at 98 um, and 2 are needed",)
         )
         store.finish_fibre(
             replace(doubtful, outcome=Outcome.DOUBTFUL, cause="not trusted", bending=alone)
@@ -82,7 +82,15 @@ def test_what_all_fibres_share_is_as_the_command_for_the_size_of_a_sample_has_it
     folder: Path, page: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["sample-size", str(folder)]) == 0
-    printed = re.search(r"shared by all: (±[\d.]+ %)", capsys.readouterr().out)
+    out = capsys.readouterr().out
+    found = re.search(r"sd of ln\(EI\) ([\d.]+);", out)
+    doubt = re.search(r"that of 3 fibres: it may be ([\d.]+) to ([\d.]+) \(95 %\)", out)
+    assert found is not None
+    assert doubt is not None
+    # The table of chi-square has 7.378 and 0.0506 for two degrees of freedom.
+    assert float(doubt[1]) == pytest.approx(float(found[1]) * math.sqrt(2.0 / 7.378), abs=0.01)
+    assert float(doubt[2]) == pytest.approx(float(found[1]) * math.sqrt(2.0 / 0.0506), rel=0.01)
+    printed = re.search(r"shared by all: (±[\d.]+ %)", out)
     assert printed is not None
     assert f"({printed[1]} is shared by all" in page
 
@@ -103,7 +111,7 @@ def test_what_all_fibres_share_is_as_the_command_for_the_size_of_a_sample_has_it
         "It does not show how often real jaws miss",
         "failed: jaw adhesion",
         "measured, not trusted: not trusted",
-        "1 good spans, and 2 are needed",
+        "1 good spans, at 98 µm, and 2 are needed",
         "the fibre did not follow the jaws in 4 tries",
         "0.42 µm",
         "before grasp, 2432 µm wide",

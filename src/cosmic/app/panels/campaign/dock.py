@@ -116,6 +116,12 @@ class CampaignDock(QObject):
         return campaign is not None and campaign.phase == "paused"
 
     @property
+    def request(self) -> str:
+        """What that waits for a person to do; "" for nothing."""
+        campaign = self._campaign
+        return "" if campaign is None or campaign.over else campaign.request
+
+    @property
     def unfinished(self) -> bool:
         """True where the campaign begun here last ended early: it can be resumed."""
         campaign = self._campaign
@@ -131,9 +137,13 @@ class CampaignDock(QObject):
         """Have the campaign that is paused, or ended early, go on."""
         self.panel.procedure.resume.click()
 
+    def confirm_plate(self) -> None:
+        """Say that the plate is there which the campaign asks for."""
+        self.panel.confirm_plate()
+
     def show_report(self) -> None:
         """Write the report of the campaign, and open it."""
-        self.panel.report.click()
+        self.panel.show_report()
 
     def _load(self) -> None:
         """Load statistics and all that the panel needs while nobody waits for it."""

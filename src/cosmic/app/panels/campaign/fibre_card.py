@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QRect, QSize, Qt, Signal
+from PySide6.QtCore import QPointF, QRect, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
     QComboBox,
@@ -43,7 +43,7 @@ from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.palette import OKABE_ITO, ON_IMAGE, Palette
 from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
 from cosmic.frame.overrides import override
-from cosmic.frame.units import TWO_SIDED
+from cosmic.frame.units import TWO_SIDED, with_micro_signs
 
 
 class FibreImageView(QWidget):
@@ -134,6 +134,7 @@ _OUT: Final = OKABE_ITO["sky blue"]
 _BACK: Final = OKABE_ITO["orange"]
 _POINT_PX: Final = 6
 _AXIS_PX: Final = 52
+_GAP_PX: Final = 2.0
 
 
 class FibreCurves(CurveFrame):
@@ -153,6 +154,8 @@ class FibreCurves(CurveFrame):
         )
         self._curves: tuple[SpanCurve, ...] = ()
         self.labels: list[pg.TextItem] = []
+        self._ends: list[QPointF] = []
+        self.box.sigTransformChanged.connect(self._place_labels)
         self._restyle()
 
     @override
@@ -168,7 +171,7 @@ class FibreCurves(CurveFrame):
         for box in (self.box, self.left):
             for item in list(box.addedItems):
                 box.removeItem(item)
-        self.labels = []
+        self.labels, self._ends = [], []
         palette = current_palette()
         for curve in self._curves:
             back = ~curve.loading
@@ -189,15 +192,37 @@ class FibreCurves(CurveFrame):
             self.left.addItem(pg.InfiniteLine(0.0, 0, pen=pg.mkPen(palette.dim, width=1)))
             self.box.autoRange(padding=0.12)
             self.left.autoRange(padding=0.12)
+            self._place_labels()
 
     def _label(self, curve: SpanCurve, colour: str) -> None:
         last = int(np.argmax(curve.probe_um))
         text = f"{curve.place_um:.0f} µm" + ("" if curve.used else ", not used")
         label = pg.TextItem(text, color=colour, anchor=(1.0, 1.0))
         label.setFont(number_font(11))
-        label.setPos(float(curve.probe_um[last]), float(curve.force_un[last]))
+        end = QPointF(float(curve.probe_um[last]), float(curve.force_un[last]))
+        label.setPos(end)
         self.labels.append(label)
+        self._ends.append(end)
         self.box.addItem(label, ignoreBounds=True)
+
+    def _place_labels(self) -> None:
+        """Move each label so far to the left of its curve's end that it covers no other one."""
+        pixel = QPointF(*self.box.viewPixelSize())
+        if not (pixel.x() > 0.0 and pixel.y() > 0.0):
+            return
+        placed: list[QRectF] = []
+        for label, end in sorted(
+            zip(self.labels, self._ends, strict=True), key=lambda each: -each[1].x()
+        ):
+            size = label.boundingRect().size()
+            right_px, bottom_px = end.x() / pixel.x(), -end.y() / pixel.y()
+            place = QRectF(
+                right_px - size.width(), bottom_px - size.height(), size.width(), size.height()
+            )
+            while covered := next((each for each in placed if place.intersects(each)), None):
+                place.moveRight(covered.left() - _GAP_PX)
+            placed.append(place)
+            label.setPos(place.right() * pixel.x(), end.y())
 
     @override
     def _colour(self, palette: Palette) -> None:
@@ -393,7 +418,7 @@ def _words(name: str) -> QLabel:
 
 
 def _say(label: QLabel, text: str) -> None:
-    label.setText(text)
+    label.setText(with_micro_signs(text))
     label.setVisible(bool(text))
 
 

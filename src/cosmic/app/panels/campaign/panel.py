@@ -24,7 +24,8 @@ from cosmic.autonomy.procedures.tree import NodeView, ProcedureTreeState
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.ask_directory import ask_directory, ask_open_file
-from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.beside import open_with_desktop
+from cosmic.frame.gui.build import named, push_button, retip, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.relay import Relay
@@ -161,6 +162,9 @@ class CampaignPanel(QWidget):
         self._home = folder
         self._policy = policy
         self._writing: JobQueue | None = None
+        self._written: Path | None = None
+        self._to_open = False
+        self.open_file: Callable[[Path], object] = open_with_desktop
         self._campaign: Campaign | None = None
         self._card: FibreRecord | None = None
         self._recipe = _FIRST
@@ -213,6 +217,10 @@ class CampaignPanel(QWidget):
         whole.addWidget(self.message)
         whole.addWidget(self.tabs, 1)
         whole.addWidget(self.procedure.buttons)  # whichever page is in front
+        room = self.message.sizePolicy()
+        room.setRetainSizeWhenHidden(True)  # what is below stays where it is clicked
+        self.message.setSizePolicy(room)
+        self.message.setFixedHeight(self.message.fontMetrics().height() + STEP_PX // 2)
         self.message.hide()
 
     def _connect(self) -> None:
@@ -220,6 +228,7 @@ class CampaignPanel(QWidget):
         self.choose.clicked.connect(self._on_choose)
         self.report.clicked.connect(self.write_report)
         self.plate.clicked.connect(self.confirm_plate)
+        self.message.clicked.connect(self._open_written)
         self.procedure.refused.connect(lambda: self.tabs.setCurrentWidget(self.procedure))
         self.card.replay_requested.connect(self._on_replay)
         self.board.fibre_chosen.connect(self.show_fibre)
@@ -255,8 +264,11 @@ class CampaignPanel(QWidget):
 
     def _show_about(self) -> None:
         """Say what the chosen recipe does, or what is wrong with it."""
+        chosen = Path(self.recipe.currentText())
+        retip(self.recipe, f"Recipe: how each fibre is treated\n{chosen}")
+        name = f"{chosen.name}: " if chosen.name != str(chosen) else ""  # the path is cut off
         try:
-            self.about.set_text(load_recipe(Path(self.recipe.currentText())).file.description)
+            self.about.set_text(f"{name}{load_recipe(chosen).file.description}")
         except CosmicError as exc:
             self.about.set_text(str(exc))
 
@@ -270,7 +282,15 @@ class CampaignPanel(QWidget):
         before = self._campaign
         if before is not None and before.unfinished and not self.folder.isModified():
             self._suggest_folder()  # Resume goes on in that of before; this one is new
-        return self._opened(Path(self.recipe.currentText()), Path(self.folder.text()))
+        self._show_about()  # the file may be another one by now
+        return self._opened(Path(self.recipe.currentText()), self._chosen_folder())
+
+    def _chosen_folder(self) -> Path:
+        """Return the folder in the field; a relative one lies where campaigns are made."""
+        typed = self.folder.text().strip()
+        if not typed:
+            raise CosmicError("no output folder is named: type one, or choose it by Folder…")
+        return self._home / typed
 
     def _go_on(self) -> ProcedurePort:
         """Return the campaign that ended early, ready to go on: its recipe, in its folder."""
@@ -373,11 +393,24 @@ class CampaignPanel(QWidget):
         written.add_callback(self._written_relay)
         self.refresh()
 
+    def show_report(self) -> None:
+        """Begin to write the report, and open it when it is written; returns at once."""
+        self._to_open = self._campaign is not None
+        self.write_report()
+
+    def _open_written(self) -> None:
+        if self._written is not None:
+            self.open_file(self._written)
+
     def _on_written(self, written: Operation[list[Path]]) -> None:
         self._end_writing()
+        to_open, self._to_open = self._to_open, False
         if written.failure is None:
             files = ", ".join(str(each) for each in written.result)
-            self._say(f"written: {files}", State.OK)
+            self._say(f"written, a click opens it: {files}", State.OK)
+            self._written = next(iter(written.result), None)
+            if to_open:
+                self._open_written()
         else:
             self._say(str(written.failure))
         self.refresh()
@@ -389,6 +422,7 @@ class CampaignPanel(QWidget):
             writing.join()
 
     def _say(self, text: str, state: State = State.REFUSED) -> None:
+        self._written = None  # the line tells of something else now
         self.message.set_text(f"{state_look(state).glyph} {text}" if text else "")
         self.message.setVisible(bool(text))
 

@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 from pyqtgraph.functions import arrayToQPolygonF
-from PySide6.QtCore import Qt, QTimer, QUrl
-from PySide6.QtGui import QColor, QDesktopServices, QHideEvent, QImage, QPen, QShowEvent
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QColor, QHideEvent, QImage, QPen, QShowEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QSplitter,
@@ -30,6 +30,7 @@ from cosmic.daqco.api.recording import open_recording
 from cosmic.frame.background import BackgroundJobs
 from cosmic.frame.errors import CosmicError, RecordingError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.gui.beside import open_with_desktop
 from cosmic.frame.gui.build import named
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.painting import painting
@@ -268,11 +269,6 @@ class ResultsPanel(QWidget):
         self._jobs.request_end()
         self._jobs.join()
         self.viewer.pictures.release()
-
-
-def open_with_desktop(path: Path) -> None:
-    """Open a file with the program that the desktop has for it."""
-    QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
 
 
 def free_base(folder: Path, base: str) -> Path:
