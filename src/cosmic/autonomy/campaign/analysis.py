@@ -31,6 +31,7 @@ from cosmic.autonomy.campaign.records import (
     Outcome,
 )
 from cosmic.autonomy.campaign.storage_format import (
+    DATABASE,
     FIBRES,
     FINAL,
     Cell,
@@ -433,8 +434,9 @@ def _alike(one: object, other: object) -> bool:
 def altered_files(reader: CampaignReader) -> tuple[str, ...]:
     """Return what of a folder, beside raw curves, is not as it was written, in words.
 
-    These are images, fitted curves, what each run was made with, copies of the files of that, and
-    raw files that belong to no fibre of the record.
+    These are images, fitted curves, what each run was made with, copies of the files of that, raw
+    files that belong to no fibre of the record, and parts of the database that another program
+    has changed.
 
     Raises
     ------
@@ -458,7 +460,8 @@ def altered_files(reader: CampaignReader) -> tuple[str, ...]:
     ]
     copies = [f"{each}: its copy differs or is missing" for each in changed_files(reader.folder)]
     records = changed_records(reader.folder, reader.run_records())
-    return (*strangers, *altered, *records, *copies)
+    parts = [f"{DATABASE}: {each} was changed since" for each in reader.changed_parts()]
+    return (*parts, *strangers, *altered, *records, *copies)
 
 
 def _digest(path: Path) -> str:

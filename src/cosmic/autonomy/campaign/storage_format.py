@@ -46,7 +46,7 @@ CREATE TABLE campaign (
     seed INTEGER NOT NULL, rate REAL NOT NULL, versions_json TEXT NOT NULL,
     world TEXT NOT NULL DEFAULT '',
     ended TEXT NOT NULL DEFAULT '', end_reason TEXT NOT NULL DEFAULT '',
-    analysis_json TEXT NOT NULL DEFAULT ''
+    analysis_json TEXT NOT NULL DEFAULT '', sums_json TEXT NOT NULL DEFAULT ''
 );
 CREATE TABLE run (
     number INTEGER PRIMARY KEY, started TEXT NOT NULL, versions_json TEXT NOT NULL,
@@ -118,6 +118,7 @@ ADDED: Final = {
     "campaign": {
         "world": "TEXT NOT NULL DEFAULT ''",
         "analysis_json": "TEXT NOT NULL DEFAULT ''",
+        "sums_json": "TEXT NOT NULL DEFAULT ''",
     },
     "run": {"record_sha256": "TEXT NOT NULL DEFAULT ''"},
     "calibration": {"age_s": "REAL"},

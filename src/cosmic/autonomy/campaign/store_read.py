@@ -1,5 +1,6 @@
 """Reading a campaign, also while it is written, and by another process."""
 
+import hashlib
 import json
 import math
 import os
@@ -13,6 +14,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
+from cosmic.autonomy.campaign.record_sums import RESULTS, RecordSums
 from cosmic.autonomy.campaign.records import (
     FIBRE,
     FINISHED,
@@ -273,6 +275,21 @@ class CampaignReader:
                 )
                 for row in rows
             ]
+
+    def changed_parts(self) -> tuple[str, ...]:
+        """Return which parts of the database something else has changed, in words.
+
+        Known of a campaign that has come to its end, and kept when it is gone on with.
+        """
+        with self._understood(), self._connection() as connection:
+            wrong = RecordSums.kept(connection).differing(connection)
+        with self._understood():
+            (row,) = self._rows("SELECT * FROM campaign")
+            text, digest = str(row["recipe_text"]), row.get("recipe_sha256")
+        parts = ["results" if each == RESULTS else f"table {each}" for each in wrong]
+        if hashlib.sha256(text.encode()).hexdigest() != digest:
+            parts.append("the recipe in it")
+        return tuple(parts)
 
     def image_files(self) -> dict[str, str]:
         """Return the files of all images with their SHA-256."""

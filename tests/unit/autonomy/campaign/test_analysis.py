@@ -343,6 +343,77 @@ def test_what_a_record_holds_that_is_not_understood_is_said_in_words(
     assert "does not know" in said or "not understood" in said
 
 
+def ended(campaign: Path, folder: Path) -> Path:
+    """A copy that has come to its end."""
+    copied(campaign, folder)
+    with CampaignStore.open(folder) as store:
+        store.end("2 fibres done", time_s=900.0)
+        finish(store)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("change", "part"),
+    [
+        ("UPDATE fibre SET outcome = 'failed', cause = 'dropped' WHERE number = 2", "table fibre"),
+        ("UPDATE fibre SET length_um = 1.5 * length_um WHERE number = 2", "table fibre"),
+        ("UPDATE fibre SET role = 'fibre' WHERE number = 4", "table fibre"),
+        ("UPDATE fibre SET file_sha256 = '' WHERE number = 2", "table fibre"),
+        ("UPDATE fibre SET began_s = began_s + 10 WHERE number = 2", "table fibre"),
+        ("UPDATE run SET end_s = 100", "table run"),
+        ("UPDATE campaign SET seed = 8", "table campaign"),
+        ("UPDATE campaign SET operator = 'somebody else'", "table campaign"),
+        ("DELETE FROM operation WHERE fibre = 2", "table operation"),
+        ("INSERT INTO sighting (plate, number) VALUES (1, 77)", "table sighting"),
+        ("INSERT INTO calibration VALUES ('map', 0.1, 'px', 'now', 1, 0.0)", "table calibration"),
+        ("UPDATE campaign SET recipe_text = recipe_text || '# x'", "the recipe in it"),
+        ("UPDATE campaign SET analysis_json = analysis_json || ' '", "results"),
+    ],
+)
+def test_what_was_changed_in_the_record_by_another_program_is_named(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], change: str, part: str
+) -> None:
+    folder = ended(campaign, tmp_path / "copy")
+    assert main(["recompute", str(folder)]) == 0
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute(change)
+    base.close()
+    assert main(["recompute", str(folder)]) == 4
+    said = f"not as it was written: campaign.sqlite: {part} was changed since\n"
+    assert said in capsys.readouterr().out
+
+
+def test_what_was_changed_in_the_record_stays_known_when_it_is_gone_on_with(
+    campaign: Path, tmp_path: Path
+) -> None:
+    folder = ended(campaign, tmp_path / "copy")
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute("UPDATE fibre SET outcome = 'failed' WHERE number = 2")
+        base.execute("UPDATE fibre SET ei_n_m2 = 1e-10 WHERE number = 3")
+    base.close()
+    assert CampaignReader(folder).changed_parts() == ("table fibre", "results")
+    with CampaignStore.open(folder, run=False) as store:
+        finish(store)  # the values are those of the raw files again; who was left out is not known
+    assert CampaignReader(folder).changed_parts() == ("table fibre",)
+    with CampaignStore.open(folder) as store:
+        assert CampaignReader(folder).changed_parts() == ("table fibre",)
+        store.end("2 fibres done", time_s=950.0)
+    assert CampaignReader(folder).changed_parts() == ("table fibre",)
+
+
+def test_a_record_of_an_earlier_program_that_kept_no_sums_is_read_as_before(
+    campaign: Path, tmp_path: Path
+) -> None:
+    folder = ended(campaign, tmp_path / "copy")
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute("ALTER TABLE campaign DROP COLUMN sums_json")
+    base.close()
+    assert main(["recompute", str(folder)]) == 0
+    with CampaignStore.open(folder) as store:
+        store.end("2 fibres done", time_s=950.0)
+    assert main(["recompute", str(folder)]) == 0
+
+
 def test_a_raw_file_of_an_older_program_that_is_another_fibres_is_refused(
     campaign: Path, tmp_path: Path
 ) -> None:
