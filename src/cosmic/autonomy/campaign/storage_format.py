@@ -96,7 +96,7 @@ CREATE TABLE operation (
 );
 CREATE TABLE journal (
     number INTEGER PRIMARY KEY, fibre INTEGER, time_s REAL NOT NULL, operation TEXT NOT NULL,
-    phase TEXT NOT NULL, payload_json TEXT NOT NULL
+    phase TEXT NOT NULL, payload_json TEXT NOT NULL, run INTEGER
 );
 """
 
@@ -134,6 +134,7 @@ ADDED: Final = {
         "probability": "REAL",
     },
     "span": {"off_model_log": "REAL"},
+    "journal": {"run": "INTEGER"},
 }
 """Columns that a campaign begun with an earlier program does not have."""
 

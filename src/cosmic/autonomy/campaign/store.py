@@ -486,6 +486,7 @@ class CampaignStore:
             "operation": operation,
             "phase": phase,
             "payload_json": json.dumps(dict(payload or {})),
+            "run": self._run,
         }
         with self._connection.transaction(durable=False) as connection:
             insert(connection, "journal", row)

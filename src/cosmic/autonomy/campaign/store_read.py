@@ -112,13 +112,29 @@ class CampaignReader:
         return len(rows) == 2 and rows[1]["end_s"] is None
 
     def elapsed_s(self) -> float:
-        """Return how long all runs took together, on the platform's clock."""
+        """Return how long all runs took together, on the platform's clock.
+
+        A run that was cut off counts until the last that it wrote of: a fibre, or in the journal.
+        """
         rows = self._rows(
-            "SELECT run.begin_s AS begin_s, max(coalesce(run.end_s, run.begin_s),"
+            "SELECT run.*, max(coalesce(run.end_s, run.begin_s),"
             " coalesce(max(fibre.ended_s), run.begin_s), coalesce(max(fibre.began_s), run.begin_s))"
-            " AS end_s FROM run LEFT JOIN fibre ON fibre.run = run.number GROUP BY run.number"
+            " AS until_s FROM run LEFT JOIN fibre ON fibre.run = run.number GROUP BY run.number"
         )
-        return sum(number(row["end_s"]) - number(row["begin_s"]) for row in rows)
+        noted_s = self._noted_s()
+        for row in rows:
+            if row["end_s"] is None:
+                row["until_s"] = max(number(row["until_s"]), noted_s.get(row["number"], -math.inf))
+        return sum(number(row["until_s"]) - number(row["begin_s"]) for row in rows)
+
+    def _noted_s(self) -> dict[Cell, float]:
+        """Return when each run wrote the last line of its journal."""
+        with self._connection() as connection:
+            columns = {row[1] for row in connection.execute("PRAGMA table_info(journal)")}
+        if "run" not in columns:  # of an earlier program
+            return {}
+        rows = self._rows("SELECT run, max(time_s) AS noted_s FROM journal GROUP BY run")
+        return {row["run"]: number(row["noted_s"]) for row in rows}
 
     def calibrations(self) -> tuple[CalibrationNote, ...]:
         """Return the calibrations that were in force, oldest first."""
@@ -398,7 +414,7 @@ class CampaignReader:
         except sqlite3.Error as exc:
             raise CampaignError(f"{file} cannot be read: {exc}") from exc
 
-    def _rows(self, query: str, *values: Cell) -> list[Row]:
+    def _rows(self, query: str, *values: Cell) -> list[dict[str, Cell]]:
         with self._connection() as connection:
             return [dict(row) for row in connection.execute(query, values).fetchall()]
 

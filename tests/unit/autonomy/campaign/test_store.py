@@ -162,6 +162,18 @@ def test_time_counts_from_run_to_run(tmp_path: Path) -> None:
         assert store.reader.elapsed_s() == pytest.approx(24.0 + 19.0)
 
 
+def test_the_time_of_a_run_that_was_cut_off_counts_until_its_last_line(tmp_path: Path) -> None:
+    with CampaignStore.create(tmp_path, INFO, time_s=100.0) as store:
+        store.note("survey", "begin", time_s=130.0)
+        number = store.begin_fibre(time_s=140.0)
+        store.note("lift", "begin", time_s=155.0, fibre=number)  # and it is killed
+    with CampaignStore.open(tmp_path, time_s=5.0) as store:
+        store.note("survey", "begin", time_s=25.0)
+        assert store.reader.elapsed_s() == pytest.approx(55.0 + 20.0)
+        store.end("done", time_s=30.0)
+        assert store.reader.elapsed_s() == pytest.approx(55.0 + 25.0)
+
+
 def test_the_journal_reports_what_was_about_to_happen(store: CampaignStore) -> None:
     journal = Journal(store, lambda: 12.5)
     journal.note("survey", "begin")
