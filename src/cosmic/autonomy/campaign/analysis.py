@@ -14,12 +14,14 @@ from typing import Any, Final
 
 import cosmic.autonomy.bending
 from cosmic.autonomy.bending.fit import (
+    Certificate,
+    MeasuredFibre,
     assess_campaign,
     half_width_percent,
     in_time,
     measure_fibre,
 )
-from cosmic.autonomy.bending.result import BendingResult
+from cosmic.autonomy.bending.result import BendingError, BendingResult
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.standards import ForceScale, StandardReading
 from cosmic.autonomy.campaign.provenance import changed_files, changed_records
@@ -37,6 +39,7 @@ from cosmic.autonomy.campaign.storage_format import (
     Cell,
     RawFibre,
     fitted_file,
+    raw_file,
     read_raw,
     result_row,
     span_row,
@@ -185,7 +188,8 @@ def analyse(
     Raises
     ------
     CampaignError
-        A raw file is missing, was changed, or the settings are not understood.
+        A raw file is missing, was changed or cannot be analysed, or the settings are not
+        understood.
     """
     settings = settings or settings_of(reader)
     raw = [each for each in _raw(reader, check=check) if each.assessed and each.spans]
@@ -193,13 +197,7 @@ def analyse(
     raw = [each for each in raw if each.role != STANDARD or standard is not None]
     measured = in_time(
         [
-            measure_fibre(
-                each.spans,
-                settings=settings.fit.model_copy(
-                    update={"fibre_width_um": _width_um(each, settings)}
-                ),
-                certificate=standard if each.role == STANDARD else None,
-            )
+            _measured(reader, each, settings, standard if each.role == STANDARD else None)
             for each in raw
         ],
         [each.elapsed_s for each in raw],
@@ -215,6 +213,23 @@ def analyse(
     numbers = [each.number for each, _ in (*fibres, *standards)]
     results = dict(zip(numbers, (*found.fibres, *found.standards), strict=True))
     return Analysis(results, found.scale, found.friction, settings, analysis_version())
+
+
+def _measured(
+    reader: CampaignReader,
+    raw: RawFibre,
+    settings: AnalysisSettings,
+    certificate: Certificate | None,
+) -> MeasuredFibre:
+    """Return what the spans of one fibre show; raises `CampaignError` with its file's name."""
+    width = {"fibre_width_um": _width_um(raw, settings)}
+    try:
+        return measure_fibre(
+            raw.spans, settings=settings.fit.model_copy(update=width), certificate=certificate
+        )
+    except BendingError as exc:
+        file = reader.folder / raw_file(raw.number)
+        raise CampaignError(f"{file} cannot be analysed: {exc}") from exc
 
 
 def _width_um(raw: RawFibre, settings: AnalysisSettings) -> float:

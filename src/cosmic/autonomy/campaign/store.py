@@ -51,7 +51,7 @@ from cosmic.autonomy.campaign.storage_format import (
     statements,
     update,
 )
-from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.autonomy.campaign.store_read import CampaignReader, refuse_raw_files_alone
 from cosmic.frame import kept_file
 from cosmic.frame.kept_file import PART
 from cosmic.frame.platform_services import sync_folder
@@ -311,13 +311,14 @@ class CampaignStore:
         Raises
         ------
         CampaignError
-            There is a campaign in it, or it cannot be written.
+            There is a campaign in it, or raw files of one, or it cannot be written.
         """
         folder = Path(folder)
         if CampaignReader(folder).version() != 0:
             raise CampaignError(
                 f"{folder} already holds a campaign: resume it, or name another folder"
             )
+        refuse_raw_files_alone(folder)
         store = cls._opened(folder, now, info)
         try:
             store._begin_run(time_s, info.versions)  # noqa: SLF001 - its own class

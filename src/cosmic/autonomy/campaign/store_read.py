@@ -30,6 +30,7 @@ from cosmic.autonomy.campaign.records import (
 )
 from cosmic.autonomy.campaign.storage_format import (
     DATABASE,
+    FIBRES,
     FINAL,
     SCHEMA_VERSION,
     Cell,
@@ -64,10 +65,12 @@ class CampaignReader:
             It is not.
         """
         if not (self.folder / DATABASE).exists():
+            refuse_raw_files_alone(self.folder)
             what = f"there is no {DATABASE} in it" if self.folder.is_dir() else "it is not a folder"
             raise CampaignError(f"{self.folder} holds no campaign: {what}")
         version = self.version()
         if version == 0:
+            refuse_raw_files_alone(self.folder)
             raise CampaignError(f"{self.folder} holds no campaign: its creation was interrupted")
         if version != SCHEMA_VERSION:
             raise CampaignError(
@@ -423,6 +426,22 @@ class CampaignReader:
         for row in self._rows(query):
             found.setdefault(row["fibre"], []).append(row)
         return found
+
+
+def refuse_raw_files_alone(folder: Path) -> None:
+    """Refuse a folder with raw files of fibres that no database tells of.
+
+    Raises
+    ------
+    CampaignError
+        A campaign begun there would write over them.
+    """
+    alone = sorted((folder / FIBRES).glob("*.h5"))
+    if alone:
+        raise CampaignError(
+            f"{folder} holds raw files of {len(alone)} fibres, such as {FIBRES}/{alone[0].name}, "
+            f"and no {DATABASE} that tells of them: take it from a copy, or name another folder"
+        )
 
 
 def _entry(row: Row) -> JournalEntry:

@@ -6,13 +6,21 @@ import math
 import random
 import shutil
 import sqlite3
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
 import pytest
 
 from cosmic.app.cli import main
-from cosmic.autonomy.campaign.analysis import analyse, compare, finish, scale_in, settings_in
+from cosmic.autonomy.campaign.analysis import (
+    altered_files,
+    analyse,
+    compare,
+    finish,
+    scale_in,
+    settings_in,
+)
 from cosmic.autonomy.campaign.provenance import Provenance, sha256_of, write_provenance
 from cosmic.autonomy.campaign.records import STANDARD, CampaignError, Outcome, Shape
 from cosmic.autonomy.campaign.report import write_report
@@ -348,7 +356,6 @@ def ended(campaign: Path, folder: Path) -> Path:
     copied(campaign, folder)
     with CampaignStore.open(folder) as store:
         store.end("2 fibres done", time_s=900.0)
-        finish(store)
     return folder
 
 
@@ -371,15 +378,25 @@ def ended(campaign: Path, folder: Path) -> Path:
     ],
 )
 def test_what_was_changed_in_the_record_by_another_program_is_named(
-    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], change: str, part: str
+    campaign: Path, tmp_path: Path, change: str, part: str
 ) -> None:
-    folder = ended(campaign, tmp_path / "copy")
-    assert main(["recompute", str(folder)]) == 0
-    with sqlite3.connect(folder / "campaign.sqlite") as base:
+    reader = CampaignReader(ended(campaign, tmp_path / "copy"))
+    assert reader.changed_parts() == ()
+    with sqlite3.connect(reader.folder / "campaign.sqlite") as base:
         base.execute(change)
     base.close()
+    assert f"campaign.sqlite: {part} was changed since" in altered_files(reader)
+
+
+def test_the_command_ends_with_4_where_the_record_was_changed_and_no_value(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = ended(campaign, tmp_path / "copy")
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute("UPDATE fibre SET outcome = 'failed', cause = 'dropped' WHERE number = 2")
+    base.close()
     assert main(["recompute", str(folder)]) == 4
-    said = f"not as it was written: campaign.sqlite: {part} was changed since\n"
+    said = "not as it was written: campaign.sqlite: table fibre was changed since\n"
     assert said in capsys.readouterr().out
 
 
@@ -404,14 +421,14 @@ def test_what_was_changed_in_the_record_stays_known_when_it_is_gone_on_with(
 def test_a_record_of_an_earlier_program_that_kept_no_sums_is_read_as_before(
     campaign: Path, tmp_path: Path
 ) -> None:
-    folder = ended(campaign, tmp_path / "copy")
-    with sqlite3.connect(folder / "campaign.sqlite") as base:
+    reader = CampaignReader(ended(campaign, tmp_path / "copy"))
+    with sqlite3.connect(reader.folder / "campaign.sqlite") as base:
         base.execute("ALTER TABLE campaign DROP COLUMN sums_json")
     base.close()
-    assert main(["recompute", str(folder)]) == 0
-    with CampaignStore.open(folder) as store:
+    assert altered_files(reader) == ()
+    with CampaignStore.open(reader.folder) as store:
         store.end("2 fibres done", time_s=950.0)
-    assert main(["recompute", str(folder)]) == 0
+    assert altered_files(reader) == ()
 
 
 def test_a_raw_file_of_an_older_program_that_is_another_fibres_is_refused(
@@ -442,6 +459,41 @@ def test_a_raw_file_of_which_a_part_is_spoilt_costs_no_traceback(
         except CosmicError:
             refused += 1
     assert refused
+
+
+def without(name: str, file: h5py.File) -> None:
+    for column in ("way_um", "force_un", "force_std_un", "time_s", "loading"):
+        if name in ("", column):
+            del file[f"spans/00/{column}"]
+            file[f"spans/00/{column}"] = "lost" if name else []
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda file: file.attrs.update(format_version=2), "it is of version 2, and this program"),
+        (lambda file: file.attrs.update(format="cosmic recording"), "it is no file of a fibre"),
+        (lambda file: without("force_un", file), "force_un of /spans/00 is no row of numbers"),
+        (lambda file: without("", file), "cannot be analysed: the span at"),
+    ],
+)
+def test_a_raw_file_that_is_not_understood_is_named_and_why(
+    campaign: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    change: Callable[[h5py.File], None],
+    words: str,
+) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with h5py.File(folder / "fibres" / "00002.h5", "r+") as file:
+        change(file)
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute("UPDATE fibre SET file_sha256 = ''")
+    base.close()
+    assert main(["recompute", str(folder)]) == 1
+    said = capsys.readouterr().err
+    assert "00002.h5 cannot be" in said
+    assert words in said
 
 
 def test_another_version_of_the_analysis_is_named(campaign: Path, tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ import pytest
 from cosmic.autonomy.bending.bent_shape import BentShape
 from cosmic.autonomy.bending.span import Freed
 from cosmic.autonomy.campaign.analysis import altered_files
+from cosmic.autonomy.campaign.opening import check_folder
 from cosmic.autonomy.campaign.recorder import Journal
 from cosmic.autonomy.campaign.records import (
     CalibrationNote,
@@ -206,6 +207,28 @@ def test_a_begin_that_was_cut_off_can_be_begun_again(tmp_path: Path) -> None:
         CampaignStore.open(tmp_path)
     with CampaignStore.create(tmp_path, INFO) as store:
         assert store.reader.info().name == "quick"
+
+
+@pytest.mark.parametrize("emptied", [True, False])
+def test_no_campaign_is_begun_over_raw_files_whose_database_is_lost(
+    store: CampaignStore, *, emptied: bool
+) -> None:
+    store.finish_fibre(good(store.begin_fibre(time_s=0.0)))
+    store.close()
+    database = store.folder / "campaign.sqlite"
+    database.unlink()
+    if emptied:
+        database.touch()
+    raw = (store.folder / "fibres" / "00001.h5").read_bytes()
+    alone = r"holds raw files of 1 fibres, such as fibres/00001\.h5, and no campaign\.sqlite"
+    with pytest.raises(CampaignError, match=alone):
+        CampaignStore.create(store.folder, INFO)
+    with pytest.raises(CampaignError, match=alone):
+        CampaignReader(store.folder).check()
+    if not emptied:
+        with pytest.raises(CampaignError, match=alone):
+            check_folder(store.folder)
+    assert (store.folder / "fibres" / "00001.h5").read_bytes() == raw
 
 
 def test_a_campaign_is_there_whole_or_not_at_all(
