@@ -267,7 +267,14 @@ def _lay_out(file: Path, info: CampaignInfo) -> None:
         raise _failure(file, exc) from exc
 
 
+_CLOSED: Final = (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_PERM)
+
+
 def _failure(file: Path, error: sqlite3.Error | OSError) -> NotWrittenError:
+    if getattr(error, "sqlite_errorcode", 0) & 0xFF in _CLOSED:
+        return NotWrittenError(
+            f"{file} cannot be written: {error}. It is as it was: see who may write in its folder"
+        )
     return NotWrittenError(
         f"{file} cannot be written: {error}. Completed fibres are saved: make room, and "
         "start the campaign again in the same folder"

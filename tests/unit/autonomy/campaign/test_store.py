@@ -418,6 +418,12 @@ def test_a_folder_in_which_no_database_can_be_made_is_refused_by_name(tmp_path: 
         CampaignStore.create(tmp_path, INFO)
 
 
+def test_where_a_database_cannot_be_opened_it_is_not_said_to_make_room(tmp_path: Path) -> None:
+    (tmp_path / "campaign.sqlite").mkdir()
+    with pytest.raises(CampaignError, match="It is as it was: see who may write in its folder"):
+        CampaignStore.open(tmp_path)
+
+
 def test_a_raw_file_written_just_before_the_end_is_no_stranger(tmp_path: Path) -> None:
     with CampaignStore.create(tmp_path, INFO) as store:
         number = store.begin_fibre(time_s=1.0)
