@@ -356,6 +356,8 @@ class Comparison:
     differences : tuple of str
         What else in the record is not what the raw files give, in words: scale of the force,
         budgets, spans and the like. Only what the same program made can be compared so closely.
+    standards_left_out : int
+        Measurements of a standard that are not analysed, as the settings name no standard.
     """
 
     compared: int
@@ -364,6 +366,7 @@ class Comparison:
     scale_percent: float
     missing: tuple[int, ...] = ()
     differences: tuple[str, ...] = ()
+    standards_left_out: int = 0
 
     @property
     def same(self) -> bool:
@@ -382,16 +385,28 @@ def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
     changed = tuple(
         change for record, result in pairs if (change := _change(record, result)) is not None
     )
+    left_out = analysis.settings.standard.ei_n_m2 <= 0.0  # then none is analysed
     missing = tuple(
         number
         for number, record in records.items()
-        if record.bending is not None and number not in analysis.results
+        if record.bending is not None
+        and number not in analysis.results
+        and not (left_out and record.role == STANDARD)
     )
     percent = 100.0 * (analysis.scale.off_part - off)
     differences: tuple[str, ...] = ()
     if kept and not versions:
         differences = tuple(_differences(pairs, changed, scale, analysis.scale))
-    return Comparison(len(pairs), changed, versions, percent, missing, differences)
+    standards = [each for each in records.values() if each.role == STANDARD and each.bending]
+    return Comparison(
+        len(pairs),
+        changed,
+        versions,
+        percent,
+        missing,
+        differences,
+        standards_left_out=len(standards) if left_out else 0,
+    )
 
 
 def _versions(kept: Mapping[str, Any], analysis: Analysis) -> tuple[str, ...]:

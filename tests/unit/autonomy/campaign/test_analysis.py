@@ -496,6 +496,17 @@ def test_a_raw_file_that_is_not_understood_is_named_and_why(
     assert words in said
 
 
+def test_by_a_recipe_without_a_standard_its_measurements_are_not_said_to_be_lost(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = tmp_path / "other.toml"
+    other.write_text('procedure = "bend test"\n[stop]\ncount = 2\n', "utf-8")
+    assert main(["recompute", str(campaign), "--recipe", str(other)]) == 3
+    said = capsys.readouterr().out
+    assert "2 measurements of the standard are not used: these settings name none" in said
+    assert "not in the raw files" not in said
+
+
 def test_another_version_of_the_analysis_is_named(campaign: Path, tmp_path: Path) -> None:
     folder = copied(campaign, tmp_path / "copy")
     with sqlite3.connect(folder / "campaign.sqlite") as base:
