@@ -3,7 +3,6 @@
 import hashlib
 import json
 import math
-import os
 import sqlite3
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -456,8 +455,14 @@ def _entry(row: Row) -> JournalEntry:
 
 
 def _address(file: Path) -> str:
-    """Return what to open for reading; a folder that cannot be written is one that stays."""
-    written = os.access(file.parent, os.W_OK) or file.with_name(f"{file.name}-wal").exists()
+    """Return what to open for reading, so that nothing is made beside it.
+
+    Without a log beside it nobody writes the database, and one who begins meanwhile leaves the
+    file itself as it is until much is in the log. SQLite would make a log only to read, and leave
+    it there.
+    """
+    beside = (file.with_name(f"{file.name}-{each}") for each in ("wal", "journal"))
+    written = any(each.exists() for each in beside)
     return f"{file.resolve().as_uri()}?mode=ro{'' if written else '&immutable=1'}"
 
 

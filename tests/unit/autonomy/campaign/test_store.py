@@ -257,6 +257,18 @@ def test_a_folder_that_cannot_be_written_can_still_be_read(
     assert sorted(each.name for each in tmp_path.iterdir()) == before
 
 
+def test_to_read_a_campaign_leaves_its_folder_as_it_is(store: CampaignStore) -> None:
+    store.finish_fibre(failed(store.begin_fibre(time_s=0.0)))
+    assert len(store.reader.fibres()) == 1  # also while it is written
+    store.close()
+    before = sorted(each.name for each in store.folder.iterdir())
+    reader = CampaignReader(store.folder)
+    reader.check()
+    assert len(reader.fibres()) == 1
+    assert altered_files(reader) == ()
+    assert sorted(each.name for each in store.folder.iterdir()) == before
+
+
 def test_a_second_writer_is_refused_while_readers_are_not(store: CampaignStore) -> None:
     with pytest.raises(CampaignError, match="already being written there"):
         CampaignStore.open(store.folder)
