@@ -96,6 +96,8 @@ class Analysis:
     settings : AnalysisSettings
     versions : mapping
         By which program.
+    recorded : frozenset of int
+        Fibres and standards that had their end when it was begun.
     """
 
     results: Mapping[int, BendingResult]
@@ -103,6 +105,7 @@ class Analysis:
     friction: float
     settings: AnalysisSettings
     versions: Mapping[str, str]
+    recorded: frozenset[int] = frozenset()
 
     def as_json(self) -> dict[str, Any]:
         """Return what goes into the record beside the results."""
@@ -192,6 +195,7 @@ def analyse(
         understood.
     """
     settings = settings or settings_of(reader)
+    recorded = frozenset(_records(reader))  # before raw files: more may come while it runs
     raw = [each for each in _raw(reader, check=check) if each.assessed and each.spans]
     standard = certificate_of(settings.standard) if settings.standard.ei_n_m2 > 0.0 else None
     raw = [each for each in raw if each.role != STANDARD or standard is not None]
@@ -212,7 +216,12 @@ def analyse(
     )
     numbers = [each.number for each, _ in (*fibres, *standards)]
     results = dict(zip(numbers, (*found.fibres, *found.standards), strict=True))
-    return Analysis(results, found.scale, found.friction, settings, analysis_version())
+    return Analysis(results, found.scale, found.friction, settings, analysis_version(), recorded)
+
+
+def _records(reader: CampaignReader) -> dict[int, FibreRecord]:
+    """Return fibres and standards that have their end, by number."""
+    return {each.number: each for each in (*reader.finished(), *reader.fibres(STANDARD))}
 
 
 def _measured(
@@ -380,7 +389,7 @@ def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
     versions = _versions(kept, analysis) if kept else ()
     scale = scale_in(kept)
     off = 0.0 if scale is None else scale.off_part
-    records = {each.number: each for each in (*reader.finished(), *reader.fibres(STANDARD))}
+    records = _records(reader)
     pairs = [(records[number], result) for number, result in analysis.results.items()]
     changed = tuple(
         change for record, result in pairs if (change := _change(record, result)) is not None
@@ -390,6 +399,7 @@ def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
         number
         for number, record in records.items()
         if record.bending is not None
+        and number in analysis.recorded
         and number not in analysis.results
         and not (left_out and record.role == STANDARD)
     )

@@ -263,6 +263,16 @@ def test_of_a_running_campaign_it_says_that_it_is_running(
     assert "is running" not in capsys.readouterr().out
 
 
+def test_a_fibre_that_is_finished_meanwhile_is_not_said_to_be_lost(
+    campaign: Path, tmp_path: Path
+) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with CampaignStore.open(folder) as store:
+        analysis = analyse(store.reader)
+        store.finish_fibre(good(store.begin_fibre(time_s=500.0)))
+        assert compare(store.reader, analysis).missing == ()
+
+
 def test_of_a_campaign_that_did_not_come_to_its_end_it_says_so(
     campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
