@@ -261,8 +261,8 @@ def _add_analysis_commands(
     trial.add_argument(
         "--world", choices=("friendly", "realistic", "harsh"), default="realistic", help="of which"
     )
-    trial.add_argument("--fibres", type=_count, default=16, help="fibres of a session")
-    trial.add_argument("--sessions", type=_count, default=1, help="sessions, each drawn anew")
+    trial.add_argument("--fibres", type=_count, help="fibres of a session (default: 16)")
+    trial.add_argument("--sessions", type=_count, help="sessions, each drawn anew (default: 1)")
     trial.add_argument(
         "--sealed-by", type=Path, metavar="FILE.py", help="program of sealed sessions of your own"
     )

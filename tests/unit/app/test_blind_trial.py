@@ -141,6 +141,30 @@ def test_a_whole_trial_by_no_recipe_makes_no_folder(
     assert not (tmp_path / "trial").exists()
 
 
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (("--out", "trial"), "--out"),
+        (("--whole", "quick", "--out", "trial", "--fibres", "3"), "--fibres"),
+        (
+            ("--whole", "quick", "--out", "trial", "--sealed-by", "x.py", "--sessions", "2"),
+            "--sessions, --sealed-by",
+        ),
+    ],
+)
+def test_an_option_that_would_have_no_effect_is_refused(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    options: tuple[str, ...],
+    named: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["blind-trial", *options]) == 1
+    assert f"{named} would have no effect: " in capsys.readouterr().err
+    assert not (tmp_path / "trial").exists()
+
+
 def test_an_analysis_that_is_changed_has_another_hash() -> None:
     one = [measured(0, 5e-11, 3.0)]
     assert digest_of(one) != digest_of([measured(0, 5.0001e-11, 3.0)])

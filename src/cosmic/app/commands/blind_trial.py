@@ -30,6 +30,8 @@ from cosmic.twin.truth import TruthRecord, read_truth
 FROZEN: Final = "frozen.json"
 SEALED: Final = "sealed"
 SEED_BITS: Final = 48
+FIBRES: Final = 16
+"""Of a session, where no other number is wanted."""
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -40,18 +42,36 @@ def run(chosen: argparse.Namespace) -> int:
     Raises
     ------
     CosmicError
-        A session does not answer, its seal is broken, or the folder holds something already.
+        A session does not answer, its seal is broken, the folder holds something already, or an
+        option does not belong to this kind of trial.
     """
+    _check_options(chosen)
     if chosen.whole is not None:
         results = [whole(chosen.whole, chosen.out, chosen.world)]
     else:
         program = chosen.sealed_by or sealed_program()
         results = [
-            run_session(chosen.world, chosen.fibres, program=program, publish=_say)
-            for _ in range(chosen.sessions)
+            run_session(chosen.world, chosen.fibres or FIBRES, program=program, publish=_say)
+            for _ in range(chosen.sessions or 1)
         ]
     sys.stdout.write("\n".join(table_of(results)) + "\n")
     return max(each.exit_code for each in results)
+
+
+def _check_options(chosen: argparse.Namespace) -> None:
+    """Refuse an option that the kind of trial does not look at."""
+    if chosen.whole is None:
+        wrong, kind = {"--out": chosen.out}, "a trial of sessions writes no folder; add --whole"
+    else:
+        wrong = {
+            "--fibres": chosen.fibres,
+            "--sessions": chosen.sessions,
+            "--sealed-by": chosen.sealed_by,
+        }
+        kind = "a whole trial is one campaign, and its recipe says of how many fibres"
+    given = [name for name, value in wrong.items() if value is not None]
+    if given:
+        raise TrialError(f"{', '.join(given)} would have no effect: {kind}")
 
 
 def whole(recipe: Path, folder: Path | None, world: str) -> TrialResult:

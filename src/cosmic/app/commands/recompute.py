@@ -108,6 +108,11 @@ def lines_of(found: Comparison, analysis: Analysis) -> list[str]:
     if found.missing:
         numbers = ", ".join(map(str, found.missing))
         lines.append(f"  in the record, and not in the raw files: fibre {numbers}")
+    if found.standards_left_out:
+        lines.append(
+            f"  {found.standards_left_out} measurements of the standard are not used: "
+            "these settings name none"
+        )
     lines += [f"  otherwise in the record: {each}" for each in found.differences]
     lines += [f"another version: {each}" for each in found.versions]
     lines.append(f"scale of the force: {scale_words(analysis.scale)}")

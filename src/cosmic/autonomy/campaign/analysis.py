@@ -14,12 +14,14 @@ from typing import Any, Final
 
 import cosmic.autonomy.bending
 from cosmic.autonomy.bending.fit import (
+    Certificate,
+    MeasuredFibre,
     assess_campaign,
     half_width_percent,
     in_time,
     measure_fibre,
 )
-from cosmic.autonomy.bending.result import BendingResult
+from cosmic.autonomy.bending.result import BendingError, BendingResult
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.standards import ForceScale, StandardReading
 from cosmic.autonomy.campaign.provenance import changed_files, changed_records
@@ -31,11 +33,13 @@ from cosmic.autonomy.campaign.records import (
     Outcome,
 )
 from cosmic.autonomy.campaign.storage_format import (
+    DATABASE,
     FIBRES,
     FINAL,
     Cell,
     RawFibre,
     fitted_file,
+    raw_file,
     read_raw,
     result_row,
     span_row,
@@ -92,6 +96,8 @@ class Analysis:
     settings : AnalysisSettings
     versions : mapping
         By which program.
+    recorded : frozenset of int
+        Fibres and standards that had their end when it was begun.
     """
 
     results: Mapping[int, BendingResult]
@@ -99,6 +105,7 @@ class Analysis:
     friction: float
     settings: AnalysisSettings
     versions: Mapping[str, str]
+    recorded: frozenset[int] = frozenset()
 
     def as_json(self) -> dict[str, Any]:
         """Return what goes into the record beside the results."""
@@ -184,21 +191,17 @@ def analyse(
     Raises
     ------
     CampaignError
-        A raw file is missing, was changed, or the settings are not understood.
+        A raw file is missing, was changed or cannot be analysed, or the settings are not
+        understood.
     """
     settings = settings or settings_of(reader)
+    recorded = frozenset(_records(reader))  # before raw files: more may come while it runs
     raw = [each for each in _raw(reader, check=check) if each.assessed and each.spans]
     standard = certificate_of(settings.standard) if settings.standard.ei_n_m2 > 0.0 else None
     raw = [each for each in raw if each.role != STANDARD or standard is not None]
     measured = in_time(
         [
-            measure_fibre(
-                each.spans,
-                settings=settings.fit.model_copy(
-                    update={"fibre_width_um": _width_um(each, settings)}
-                ),
-                certificate=standard if each.role == STANDARD else None,
-            )
+            _measured(reader, each, settings, standard if each.role == STANDARD else None)
             for each in raw
         ],
         [each.elapsed_s for each in raw],
@@ -213,7 +216,29 @@ def analyse(
     )
     numbers = [each.number for each, _ in (*fibres, *standards)]
     results = dict(zip(numbers, (*found.fibres, *found.standards), strict=True))
-    return Analysis(results, found.scale, found.friction, settings, analysis_version())
+    return Analysis(results, found.scale, found.friction, settings, analysis_version(), recorded)
+
+
+def _records(reader: CampaignReader) -> dict[int, FibreRecord]:
+    """Return fibres and standards that have their end, by number."""
+    return {each.number: each for each in (*reader.finished(), *reader.fibres(STANDARD))}
+
+
+def _measured(
+    reader: CampaignReader,
+    raw: RawFibre,
+    settings: AnalysisSettings,
+    certificate: Certificate | None,
+) -> MeasuredFibre:
+    """Return what the spans of one fibre show; raises `CampaignError` with its file's name."""
+    width = {"fibre_width_um": _width_um(raw, settings)}
+    try:
+        return measure_fibre(
+            raw.spans, settings=settings.fit.model_copy(update=width), certificate=certificate
+        )
+    except BendingError as exc:
+        file = reader.folder / raw_file(raw.number)
+        raise CampaignError(f"{file} cannot be analysed: {exc}") from exc
 
 
 def _width_um(raw: RawFibre, settings: AnalysisSettings) -> float:
@@ -340,6 +365,8 @@ class Comparison:
     differences : tuple of str
         What else in the record is not what the raw files give, in words: scale of the force,
         budgets, spans and the like. Only what the same program made can be compared so closely.
+    standards_left_out : int
+        Measurements of a standard that are not analysed, as the settings name no standard.
     """
 
     compared: int
@@ -348,6 +375,7 @@ class Comparison:
     scale_percent: float
     missing: tuple[int, ...] = ()
     differences: tuple[str, ...] = ()
+    standards_left_out: int = 0
 
     @property
     def same(self) -> bool:
@@ -361,21 +389,34 @@ def compare(reader: CampaignReader, analysis: Analysis) -> Comparison:
     versions = _versions(kept, analysis) if kept else ()
     scale = scale_in(kept)
     off = 0.0 if scale is None else scale.off_part
-    records = {each.number: each for each in (*reader.finished(), *reader.fibres(STANDARD))}
+    records = _records(reader)
     pairs = [(records[number], result) for number, result in analysis.results.items()]
     changed = tuple(
         change for record, result in pairs if (change := _change(record, result)) is not None
     )
+    left_out = analysis.settings.standard.ei_n_m2 <= 0.0  # then none is analysed
     missing = tuple(
         number
         for number, record in records.items()
-        if record.bending is not None and number not in analysis.results
+        if record.bending is not None
+        and number in analysis.recorded
+        and number not in analysis.results
+        and not (left_out and record.role == STANDARD)
     )
     percent = 100.0 * (analysis.scale.off_part - off)
     differences: tuple[str, ...] = ()
     if kept and not versions:
         differences = tuple(_differences(pairs, changed, scale, analysis.scale))
-    return Comparison(len(pairs), changed, versions, percent, missing, differences)
+    standards = [each for each in records.values() if each.role == STANDARD and each.bending]
+    return Comparison(
+        len(pairs),
+        changed,
+        versions,
+        percent,
+        missing,
+        differences,
+        standards_left_out=len(standards) if left_out else 0,
+    )
 
 
 def _versions(kept: Mapping[str, Any], analysis: Analysis) -> tuple[str, ...]:
@@ -433,8 +474,9 @@ def _alike(one: object, other: object) -> bool:
 def altered_files(reader: CampaignReader) -> tuple[str, ...]:
     """Return what of a folder, beside raw curves, is not as it was written, in words.
 
-    These are images, fitted curves, what each run was made with, copies of the files of that, and
-    raw files that belong to no fibre of the record.
+    These are images, fitted curves, what each run was made with, copies of the files of that, raw
+    files that belong to no fibre of the record, and parts of the database that another program
+    has changed.
 
     Raises
     ------
@@ -458,7 +500,8 @@ def altered_files(reader: CampaignReader) -> tuple[str, ...]:
     ]
     copies = [f"{each}: its copy differs or is missing" for each in changed_files(reader.folder)]
     records = changed_records(reader.folder, reader.run_records())
-    return (*strangers, *altered, *records, *copies)
+    parts = [f"{DATABASE}: {each} was changed since" for each in reader.changed_parts()]
+    return (*parts, *strangers, *altered, *records, *copies)
 
 
 def _digest(path: Path) -> str:

@@ -22,7 +22,7 @@ from cosmic.autonomy.campaign.records import TWIN, CampaignError, CampaignInfo
 from cosmic.autonomy.campaign.resume import ResumePlan, resume
 from cosmic.autonomy.campaign.storage_format import DATABASE
 from cosmic.autonomy.campaign.store import CampaignStore
-from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.autonomy.campaign.store_read import CampaignReader, refuse_raw_files_alone
 from cosmic.autonomy.handling.context import Applications, HandlingContext, vision_of
 from cosmic.autonomy.handling.plate_change import PlateByPerson, PlateHandler
 from cosmic.autonomy.handling.settings import HandlingSettings
@@ -263,7 +263,7 @@ def check_folder(folder: Path) -> None:
     Raises
     ------
     CampaignError
-        It is none, or may not be written to; the text says which.
+        It is none, may not be written to, or has raw files alone; the text says which.
     """
     whole = folder.absolute()
     try:
@@ -274,6 +274,8 @@ def check_folder(folder: Path) -> None:
         raise CampaignError(f"{folder}: {there} is not a folder; name another folder")
     if not os.access(there, os.W_OK | os.X_OK):
         raise CampaignError(f"{folder}: {there} may not be written to; name another folder")
+    if not (whole / DATABASE).exists():
+        refuse_raw_files_alone(folder)
 
 
 def recorded(folder: Path) -> CampaignInfo | None:

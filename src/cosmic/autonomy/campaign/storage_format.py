@@ -46,7 +46,7 @@ CREATE TABLE campaign (
     seed INTEGER NOT NULL, rate REAL NOT NULL, versions_json TEXT NOT NULL,
     world TEXT NOT NULL DEFAULT '',
     ended TEXT NOT NULL DEFAULT '', end_reason TEXT NOT NULL DEFAULT '',
-    analysis_json TEXT NOT NULL DEFAULT ''
+    analysis_json TEXT NOT NULL DEFAULT '', sums_json TEXT NOT NULL DEFAULT ''
 );
 CREATE TABLE run (
     number INTEGER PRIMARY KEY, started TEXT NOT NULL, versions_json TEXT NOT NULL,
@@ -96,7 +96,7 @@ CREATE TABLE operation (
 );
 CREATE TABLE journal (
     number INTEGER PRIMARY KEY, fibre INTEGER, time_s REAL NOT NULL, operation TEXT NOT NULL,
-    phase TEXT NOT NULL, payload_json TEXT NOT NULL
+    phase TEXT NOT NULL, payload_json TEXT NOT NULL, run INTEGER
 );
 """
 
@@ -118,6 +118,7 @@ ADDED: Final = {
     "campaign": {
         "world": "TEXT NOT NULL DEFAULT ''",
         "analysis_json": "TEXT NOT NULL DEFAULT ''",
+        "sums_json": "TEXT NOT NULL DEFAULT ''",
     },
     "run": {"record_sha256": "TEXT NOT NULL DEFAULT ''"},
     "calibration": {"age_s": "REAL"},
@@ -133,6 +134,7 @@ ADDED: Final = {
         "probability": "REAL",
     },
     "span": {"off_model_log": "REAL"},
+    "journal": {"run": "INTEGER"},
 }
 """Columns that a campaign begun with an earlier program does not have."""
 
@@ -493,8 +495,23 @@ def read_curves(path: Path) -> tuple[tuple[Span, ...], tuple[Floats, ...], tuple
     return spans, fitted, series
 
 
+def _check_format(file: h5py.File) -> None:
+    """Refuse what is no raw file of a fibre, or has a meaning that this program does not know.
+
+    After the spans: of a spoilt file h5py may read a text for ever, and most fail there before.
+    """
+    said, version = file.attrs.get("format"), int(file.attrs.get("format_version", FORMAT_VERSION))
+    if said != FORMAT:
+        raise ValueError(f"it is no file of a fibre: its format is {said!r}, not {FORMAT!r}")
+    if version > FORMAT_VERSION:
+        raise ValueError(
+            f"it is of version {version}, and this program reads up to version {FORMAT_VERSION}: "
+            "use the program that wrote it"
+        )
+
+
 def _measured_span(group: h5py.Group) -> Span:
-    columns = {name: np.asarray(group[column]) for column, name in COLUMNS.items()}
+    columns = {name: _column(group[column], group.name, column) for column, name in COLUMNS.items()}
     return Span(
         nominal_um=float(group.attrs["nominal_um"]),
         probe_x_um=float(group.attrs["probe_x_um"]),
@@ -508,6 +525,13 @@ def _measured_span(group: h5py.Group) -> Span:
         freed=_freed(group),
         bent=_bent(group),
     )
+
+
+def _column(held: h5py.Dataset, span: str, column: str) -> Floats:
+    values = np.asarray(held)
+    if values.ndim != 1 or values.dtype.kind not in "fiu":
+        raise ValueError(f"{column} of {span} is no row of numbers")
+    return np.asarray(values, dtype=np.float64)
 
 
 def _freed(group: h5py.Group) -> Freed | None:
@@ -603,6 +627,7 @@ def read_raw(path: Path) -> RawFibre:
     try:
         with h5py.File(path, "r") as file:
             held = file.attrs
+            _check_format(file)
             return RawFibre(
                 number=int(held["fibre"]),
                 role=str(held["role"]),

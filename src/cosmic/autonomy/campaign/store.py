@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import logging
 import math
 import sqlite3
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -15,6 +16,7 @@ from typing import Final, Self
 import cv2
 
 from cosmic.autonomy.bending.result import BendingResult
+from cosmic.autonomy.campaign.record_sums import RESULTS, RecordSums
 from cosmic.autonomy.campaign.records import (
     FIBRE,
     FINISHED,
@@ -49,10 +51,12 @@ from cosmic.autonomy.campaign.storage_format import (
     statements,
     update,
 )
-from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.autonomy.campaign.store_read import CampaignReader, refuse_raw_files_alone
 from cosmic.frame import kept_file
 from cosmic.frame.kept_file import PART
 from cosmic.frame.platform_services import sync_folder
+
+logger = logging.getLogger(__name__)
 
 LOCK: Final = "campaign.lock"
 
@@ -263,7 +267,14 @@ def _lay_out(file: Path, info: CampaignInfo) -> None:
         raise _failure(file, exc) from exc
 
 
+_CLOSED: Final = (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_PERM)
+
+
 def _failure(file: Path, error: sqlite3.Error | OSError) -> NotWrittenError:
+    if getattr(error, "sqlite_errorcode", 0) & 0xFF in _CLOSED:
+        return NotWrittenError(
+            f"{file} cannot be written: {error}. It is as it was: see who may write in its folder"
+        )
     return NotWrittenError(
         f"{file} cannot be written: {error}. Completed fibres are saved: make room, and "
         "start the campaign again in the same folder"
@@ -307,13 +318,14 @@ class CampaignStore:
         Raises
         ------
         CampaignError
-            There is a campaign in it, or it cannot be written.
+            There is a campaign in it, or raw files of one, or it cannot be written.
         """
         folder = Path(folder)
         if CampaignReader(folder).version() != 0:
             raise CampaignError(
                 f"{folder} already holds a campaign: resume it, or name another folder"
             )
+        refuse_raw_files_alone(folder)
         store = cls._opened(folder, now, info)
         try:
             store._begin_run(time_s, info.versions)  # noqa: SLF001 - its own class
@@ -351,8 +363,7 @@ class CampaignStore:
         try:
             store.reader.check()
             remove_parts(folder / FIBRES)
-            with store._connection.transaction() as connection:  # noqa: SLF001 - its own class
-                add_columns(connection)
+            store._bring_up_to_date(run=run)  # noqa: SLF001 - its own class
             if run:
                 store._begin_run(time_s, versions or {})  # noqa: SLF001 - its own class
         except BaseException:
@@ -369,6 +380,33 @@ class CampaignStore:
                 f"{folder} cannot be made: {exc.strerror or exc}; name another folder"
             ) from exc
         return cls(folder, info, now=now)
+
+    def _bring_up_to_date(self, *, run: bool) -> None:
+        """Add what tables of an earlier program lack; what was changed in them stays known."""
+        with self._connection.transaction() as connection:
+            kept = self._sums(connection)
+            wrong = kept.differing(connection)
+            add_columns(connection)
+            if wrong:
+                logger.warning(
+                    "%s was changed by another program since the campaign was written: %s",
+                    self.folder / DATABASE,
+                    ", ".join(wrong),
+                )
+            if run:
+                kept = RecordSums(altered=wrong)
+            elif kept.sums:
+                kept = kept.renewed(connection, but=wrong)
+            kept.write(connection)
+
+    def _sums(self, connection: sqlite3.Connection) -> RecordSums:
+        try:
+            return RecordSums.kept(connection)
+        except (TypeError, ValueError) as exc:
+            raise CampaignError(
+                f"{self.folder / DATABASE} holds what this program does not know ({exc}): take "
+                "the folder from a copy"
+            ) from exc
 
     def _begin_run(self, time_s: float, versions: Mapping[str, str]) -> None:
         row: Row = {
@@ -456,6 +494,7 @@ class CampaignStore:
             "operation": operation,
             "phase": phase,
             "payload_json": json.dumps(dict(payload or {})),
+            "run": self._run,
         }
         with self._connection.transaction(durable=False) as connection:
             insert(connection, "journal", row)
@@ -539,6 +578,8 @@ class CampaignStore:
             JSON.
         """
         with self._connection.transaction() as connection:
+            sums = self._sums(connection)
+            wrong = {*sums.differing(connection)} - {RESULTS}
             for fibre, result in results.items():
                 outcome, cause, ei = connection.execute(
                     "SELECT outcome, cause, ei_n_m2 FROM fibre WHERE number = ?", (fibre,)
@@ -560,6 +601,8 @@ class CampaignStore:
             connection.execute(
                 "UPDATE campaign SET analysis_json = ?", (json.dumps(dict(analysis)),)
             )
+            if sums.sums:  # it has come to its end: nothing else is written any more
+                sums.renewed(connection, but=wrong).write(connection)
 
     def interrupt_running(self, text: str = "the campaign ended without warning") -> list[int]:
         """Mark fibres that were in treatment when the campaign ended, and return their numbers."""
@@ -594,6 +637,7 @@ class CampaignStore:
                 "UPDATE campaign SET ended = ?, end_reason = ?", (self._now().isoformat(), reason)
             )
             update(connection, "run", {"end_s": time_s}, key=self._run)
+            self._sums(connection).renewed(connection).write(connection)
 
     # ------------------------------------------------------------------ inside
 

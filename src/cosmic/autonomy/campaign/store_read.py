@@ -1,8 +1,8 @@
 """Reading a campaign, also while it is written, and by another process."""
 
+import hashlib
 import json
 import math
-import os
 import sqlite3
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -13,6 +13,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
+from cosmic.autonomy.campaign.record_sums import RESULTS, RecordSums
 from cosmic.autonomy.campaign.records import (
     FIBRE,
     FINISHED,
@@ -28,6 +29,7 @@ from cosmic.autonomy.campaign.records import (
 )
 from cosmic.autonomy.campaign.storage_format import (
     DATABASE,
+    FIBRES,
     FINAL,
     SCHEMA_VERSION,
     Cell,
@@ -62,10 +64,12 @@ class CampaignReader:
             It is not.
         """
         if not (self.folder / DATABASE).exists():
+            refuse_raw_files_alone(self.folder)
             what = f"there is no {DATABASE} in it" if self.folder.is_dir() else "it is not a folder"
             raise CampaignError(f"{self.folder} holds no campaign: {what}")
         version = self.version()
         if version == 0:
+            refuse_raw_files_alone(self.folder)
             raise CampaignError(f"{self.folder} holds no campaign: its creation was interrupted")
         if version != SCHEMA_VERSION:
             raise CampaignError(
@@ -110,13 +114,29 @@ class CampaignReader:
         return len(rows) == 2 and rows[1]["end_s"] is None
 
     def elapsed_s(self) -> float:
-        """Return how long all runs took together, on the platform's clock."""
+        """Return how long all runs took together, on the platform's clock.
+
+        A run that was cut off counts until the last that it wrote of: a fibre, or in the journal.
+        """
         rows = self._rows(
-            "SELECT run.begin_s AS begin_s, max(coalesce(run.end_s, run.begin_s),"
+            "SELECT run.*, max(coalesce(run.end_s, run.begin_s),"
             " coalesce(max(fibre.ended_s), run.begin_s), coalesce(max(fibre.began_s), run.begin_s))"
-            " AS end_s FROM run LEFT JOIN fibre ON fibre.run = run.number GROUP BY run.number"
+            " AS until_s FROM run LEFT JOIN fibre ON fibre.run = run.number GROUP BY run.number"
         )
-        return sum(number(row["end_s"]) - number(row["begin_s"]) for row in rows)
+        noted_s = self._noted_s()
+        for row in rows:
+            if row["end_s"] is None:
+                row["until_s"] = max(number(row["until_s"]), noted_s.get(row["number"], -math.inf))
+        return sum(number(row["until_s"]) - number(row["begin_s"]) for row in rows)
+
+    def _noted_s(self) -> dict[Cell, float]:
+        """Return when each run wrote the last line of its journal."""
+        with self._connection() as connection:
+            columns = {row[1] for row in connection.execute("PRAGMA table_info(journal)")}
+        if "run" not in columns:  # of an earlier program
+            return {}
+        rows = self._rows("SELECT run, max(time_s) AS noted_s FROM journal GROUP BY run")
+        return {row["run"]: number(row["noted_s"]) for row in rows}
 
     def calibrations(self) -> tuple[CalibrationNote, ...]:
         """Return the calibrations that were in force, oldest first."""
@@ -280,6 +300,21 @@ class CampaignReader:
                 for row in rows
             ]
 
+    def changed_parts(self) -> tuple[str, ...]:
+        """Return which parts of the database something else has changed, in words.
+
+        Known of a campaign that has come to its end, and kept when it is gone on with.
+        """
+        with self._understood(), self._connection() as connection:
+            wrong = RecordSums.kept(connection).differing(connection)
+        with self._understood():
+            (row,) = self._rows("SELECT * FROM campaign")
+            text, digest = str(row["recipe_text"]), row.get("recipe_sha256")
+        parts = ["results" if each == RESULTS else f"table {each}" for each in wrong]
+        if hashlib.sha256(text.encode()).hexdigest() != digest:
+            parts.append("the recipe in it")
+        return tuple(parts)
+
     def image_files(self) -> dict[str, str]:
         """Return the files of all images with their SHA-256."""
         rows = self._rows("SELECT file, sha256 FROM picture ORDER BY fibre, number")
@@ -387,7 +422,7 @@ class CampaignReader:
         except sqlite3.Error as exc:
             raise CampaignError(f"{file} cannot be read: {exc}") from exc
 
-    def _rows(self, query: str, *values: Cell) -> list[Row]:
+    def _rows(self, query: str, *values: Cell) -> list[dict[str, Cell]]:
         with self._connection() as connection:
             return [dict(row) for row in connection.execute(query, values).fetchall()]
 
@@ -396,6 +431,22 @@ class CampaignReader:
         for row in self._rows(query, *values):
             found.setdefault(row["fibre"], []).append(row)
         return found
+
+
+def refuse_raw_files_alone(folder: Path) -> None:
+    """Refuse a folder with raw files of fibres that no database tells of.
+
+    Raises
+    ------
+    CampaignError
+        A campaign begun there would write over them.
+    """
+    alone = sorted((folder / FIBRES).glob("*.h5"))
+    if alone:
+        raise CampaignError(
+            f"{folder} holds raw files of {len(alone)} fibres, such as {FIBRES}/{alone[0].name}, "
+            f"and no {DATABASE} that tells of them: take it from a copy, or name another folder"
+        )
 
 
 def _entry(row: Row) -> JournalEntry:
@@ -410,8 +461,14 @@ def _entry(row: Row) -> JournalEntry:
 
 
 def _address(file: Path) -> str:
-    """Return what to open for reading; a folder that cannot be written is one that stays."""
-    written = os.access(file.parent, os.W_OK) or file.with_name(f"{file.name}-wal").exists()
+    """Return what to open for reading, so that nothing is made beside it.
+
+    Without a log beside it nobody writes the database, and one who begins meanwhile leaves the
+    file itself as it is until much is in the log. SQLite would make a log only to read, and leave
+    it there.
+    """
+    beside = (file.with_name(f"{file.name}-{each}") for each in ("wal", "journal"))
+    written = any(each.exists() for each in beside)
     return f"{file.resolve().as_uri()}?mode=ro{'' if written else '&immutable=1'}"
 
 

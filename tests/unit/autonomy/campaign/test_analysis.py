@@ -6,13 +6,21 @@ import math
 import random
 import shutil
 import sqlite3
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
 import pytest
 
 from cosmic.app.cli import main
-from cosmic.autonomy.campaign.analysis import analyse, compare, finish, scale_in, settings_in
+from cosmic.autonomy.campaign.analysis import (
+    altered_files,
+    analyse,
+    compare,
+    finish,
+    scale_in,
+    settings_in,
+)
 from cosmic.autonomy.campaign.provenance import Provenance, sha256_of, write_provenance
 from cosmic.autonomy.campaign.records import STANDARD, CampaignError, Outcome, Shape
 from cosmic.autonomy.campaign.report import write_report
@@ -255,6 +263,16 @@ def test_of_a_running_campaign_it_says_that_it_is_running(
     assert "is running" not in capsys.readouterr().out
 
 
+def test_a_fibre_that_is_finished_meanwhile_is_not_said_to_be_lost(
+    campaign: Path, tmp_path: Path
+) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with CampaignStore.open(folder) as store:
+        analysis = analyse(store.reader)
+        store.finish_fibre(good(store.begin_fibre(time_s=500.0)))
+        assert compare(store.reader, analysis).missing == ()
+
+
 def test_of_a_campaign_that_did_not_come_to_its_end_it_says_so(
     campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -343,6 +361,86 @@ def test_what_a_record_holds_that_is_not_understood_is_said_in_words(
     assert "does not know" in said or "not understood" in said
 
 
+def ended(campaign: Path, folder: Path) -> Path:
+    """A copy that has come to its end."""
+    copied(campaign, folder)
+    with CampaignStore.open(folder) as store:
+        store.end("2 fibres done", time_s=900.0)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("change", "part"),
+    [
+        ("UPDATE fibre SET outcome = 'failed', cause = 'dropped' WHERE number = 2", "table fibre"),
+        ("UPDATE fibre SET length_um = 1.5 * length_um WHERE number = 2", "table fibre"),
+        ("UPDATE fibre SET role = 'fibre' WHERE number = 4", "table fibre"),
+        ("UPDATE fibre SET file_sha256 = '' WHERE number = 2", "table fibre"),
+        ("UPDATE fibre SET began_s = began_s + 10 WHERE number = 2", "table fibre"),
+        ("UPDATE run SET end_s = 100", "table run"),
+        ("UPDATE campaign SET seed = 8", "table campaign"),
+        ("UPDATE campaign SET operator = 'somebody else'", "table campaign"),
+        ("DELETE FROM operation WHERE fibre = 2", "table operation"),
+        ("INSERT INTO sighting (plate, number) VALUES (1, 77)", "table sighting"),
+        ("INSERT INTO calibration VALUES ('map', 0.1, 'px', 'now', 1, 0.0)", "table calibration"),
+        ("UPDATE campaign SET recipe_text = recipe_text || '# x'", "the recipe in it"),
+        ("UPDATE campaign SET analysis_json = analysis_json || ' '", "results"),
+    ],
+)
+def test_what_was_changed_in_the_record_by_another_program_is_named(
+    campaign: Path, tmp_path: Path, change: str, part: str
+) -> None:
+    reader = CampaignReader(ended(campaign, tmp_path / "copy"))
+    assert reader.changed_parts() == ()
+    with sqlite3.connect(reader.folder / "campaign.sqlite") as base:
+        base.execute(change)
+    base.close()
+    assert f"campaign.sqlite: {part} was changed since" in altered_files(reader)
+
+
+def test_the_command_ends_with_4_where_the_record_was_changed_and_no_value(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = ended(campaign, tmp_path / "copy")
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute("UPDATE fibre SET outcome = 'failed', cause = 'dropped' WHERE number = 2")
+    base.close()
+    assert main(["recompute", str(folder)]) == 4
+    said = "not as it was written: campaign.sqlite: table fibre was changed since\n"
+    assert said in capsys.readouterr().out
+
+
+def test_what_was_changed_in_the_record_stays_known_when_it_is_gone_on_with(
+    campaign: Path, tmp_path: Path
+) -> None:
+    folder = ended(campaign, tmp_path / "copy")
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute("UPDATE fibre SET outcome = 'failed' WHERE number = 2")
+        base.execute("UPDATE fibre SET ei_n_m2 = 1e-10 WHERE number = 3")
+    base.close()
+    assert CampaignReader(folder).changed_parts() == ("table fibre", "results")
+    with CampaignStore.open(folder, run=False) as store:
+        finish(store)  # the values are those of the raw files again; who was left out is not known
+    assert CampaignReader(folder).changed_parts() == ("table fibre",)
+    with CampaignStore.open(folder) as store:
+        assert CampaignReader(folder).changed_parts() == ("table fibre",)
+        store.end("2 fibres done", time_s=950.0)
+    assert CampaignReader(folder).changed_parts() == ("table fibre",)
+
+
+def test_a_record_of_an_earlier_program_that_kept_no_sums_is_read_as_before(
+    campaign: Path, tmp_path: Path
+) -> None:
+    reader = CampaignReader(ended(campaign, tmp_path / "copy"))
+    with sqlite3.connect(reader.folder / "campaign.sqlite") as base:
+        base.execute("ALTER TABLE campaign DROP COLUMN sums_json")
+    base.close()
+    assert altered_files(reader) == ()
+    with CampaignStore.open(reader.folder) as store:
+        store.end("2 fibres done", time_s=950.0)
+    assert altered_files(reader) == ()
+
+
 def test_a_raw_file_of_an_older_program_that_is_another_fibres_is_refused(
     campaign: Path, tmp_path: Path
 ) -> None:
@@ -371,6 +469,52 @@ def test_a_raw_file_of_which_a_part_is_spoilt_costs_no_traceback(
         except CosmicError:
             refused += 1
     assert refused
+
+
+def without(name: str, file: h5py.File) -> None:
+    for column in ("way_um", "force_un", "force_std_un", "time_s", "loading"):
+        if name in ("", column):
+            del file[f"spans/00/{column}"]
+            file[f"spans/00/{column}"] = "lost" if name else []
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda file: file.attrs.update(format_version=2), "it is of version 2, and this program"),
+        (lambda file: file.attrs.update(format="cosmic recording"), "it is no file of a fibre"),
+        (lambda file: without("force_un", file), "force_un of /spans/00 is no row of numbers"),
+        (lambda file: without("", file), "cannot be analysed: the span at"),
+    ],
+)
+def test_a_raw_file_that_is_not_understood_is_named_and_why(
+    campaign: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    change: Callable[[h5py.File], None],
+    words: str,
+) -> None:
+    folder = copied(campaign, tmp_path / "copy")
+    with h5py.File(folder / "fibres" / "00002.h5", "r+") as file:
+        change(file)
+    with sqlite3.connect(folder / "campaign.sqlite") as base:
+        base.execute("UPDATE fibre SET file_sha256 = ''")
+    base.close()
+    assert main(["recompute", str(folder)]) == 1
+    said = capsys.readouterr().err
+    assert "00002.h5 cannot be" in said
+    assert words in said
+
+
+def test_by_a_recipe_without_a_standard_its_measurements_are_not_said_to_be_lost(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = tmp_path / "other.toml"
+    other.write_text('procedure = "bend test"\n[stop]\ncount = 2\n', "utf-8")
+    assert main(["recompute", str(campaign), "--recipe", str(other)]) == 3
+    said = capsys.readouterr().out
+    assert "2 measurements of the standard are not used: these settings name none" in said
+    assert "not in the raw files" not in said
 
 
 def test_another_version_of_the_analysis_is_named(campaign: Path, tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ import pytest
 from cosmic.autonomy.bending.bent_shape import BentShape
 from cosmic.autonomy.bending.span import Freed
 from cosmic.autonomy.campaign.analysis import altered_files
+from cosmic.autonomy.campaign.opening import check_folder
 from cosmic.autonomy.campaign.recorder import Journal
 from cosmic.autonomy.campaign.records import (
     CalibrationNote,
@@ -162,6 +163,18 @@ def test_time_counts_from_run_to_run(tmp_path: Path) -> None:
         assert store.reader.elapsed_s() == pytest.approx(24.0 + 19.0)
 
 
+def test_the_time_of_a_run_that_was_cut_off_counts_until_its_last_line(tmp_path: Path) -> None:
+    with CampaignStore.create(tmp_path, INFO, time_s=100.0) as store:
+        store.note("survey", "begin", time_s=130.0)
+        number = store.begin_fibre(time_s=140.0)
+        store.note("lift", "begin", time_s=155.0, fibre=number)  # and it is killed
+    with CampaignStore.open(tmp_path, time_s=5.0) as store:
+        store.note("survey", "begin", time_s=25.0)
+        assert store.reader.elapsed_s() == pytest.approx(55.0 + 20.0)
+        store.end("done", time_s=30.0)
+        assert store.reader.elapsed_s() == pytest.approx(55.0 + 25.0)
+
+
 def test_the_journal_reports_what_was_about_to_happen(store: CampaignStore) -> None:
     journal = Journal(store, lambda: 12.5)
     journal.note("survey", "begin")
@@ -196,6 +209,28 @@ def test_a_begin_that_was_cut_off_can_be_begun_again(tmp_path: Path) -> None:
         assert store.reader.info().name == "quick"
 
 
+@pytest.mark.parametrize("emptied", [True, False])
+def test_no_campaign_is_begun_over_raw_files_whose_database_is_lost(
+    store: CampaignStore, *, emptied: bool
+) -> None:
+    store.finish_fibre(good(store.begin_fibre(time_s=0.0)))
+    store.close()
+    database = store.folder / "campaign.sqlite"
+    database.unlink()
+    if emptied:
+        database.touch()
+    raw = (store.folder / "fibres" / "00001.h5").read_bytes()
+    alone = r"holds raw files of 1 fibres, such as fibres/00001\.h5, and no campaign\.sqlite"
+    with pytest.raises(CampaignError, match=alone):
+        CampaignStore.create(store.folder, INFO)
+    with pytest.raises(CampaignError, match=alone):
+        CampaignReader(store.folder).check()
+    if not emptied:
+        with pytest.raises(CampaignError, match=alone):
+            check_folder(store.folder)
+    assert (store.folder / "fibres" / "00001.h5").read_bytes() == raw
+
+
 def test_a_campaign_is_there_whole_or_not_at_all(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -220,6 +255,18 @@ def test_a_folder_that_cannot_be_written_can_still_be_read(
     monkeypatch.setattr(os, "access", lambda *_: False)
     assert len(CampaignReader(tmp_path).finished()) == 1
     assert sorted(each.name for each in tmp_path.iterdir()) == before
+
+
+def test_to_read_a_campaign_leaves_its_folder_as_it_is(store: CampaignStore) -> None:
+    store.finish_fibre(failed(store.begin_fibre(time_s=0.0)))
+    assert len(store.reader.fibres()) == 1  # also while it is written
+    store.close()
+    before = sorted(each.name for each in store.folder.iterdir())
+    reader = CampaignReader(store.folder)
+    reader.check()
+    assert len(reader.fibres()) == 1
+    assert altered_files(reader) == ()
+    assert sorted(each.name for each in store.folder.iterdir()) == before
 
 
 def test_a_second_writer_is_refused_while_readers_are_not(store: CampaignStore) -> None:
@@ -381,6 +428,12 @@ def test_a_folder_in_which_no_database_can_be_made_is_refused_by_name(tmp_path: 
     (tmp_path / "campaign.sqlite.part").mkdir()
     with pytest.raises(CampaignError, match="cannot be written"):
         CampaignStore.create(tmp_path, INFO)
+
+
+def test_where_a_database_cannot_be_opened_it_is_not_said_to_make_room(tmp_path: Path) -> None:
+    (tmp_path / "campaign.sqlite").mkdir()
+    with pytest.raises(CampaignError, match="It is as it was: see who may write in its folder"):
+        CampaignStore.open(tmp_path)
 
 
 def test_a_raw_file_written_just_before_the_end_is_no_stranger(tmp_path: Path) -> None:
