@@ -13,7 +13,7 @@ from cosmic.daqco.hw.board_group import BoardGroup
 from cosmic.daqco.hw.interface import BoardChunk, InputMode, InputSettings
 from cosmic.daqco.hw.sim_board import SimulatedBoard
 from cosmic.daqco.hw.sim_library import PCI_6229, SimulatedLibrary
-from cosmic.frame.clock import ManualClock, RatedClock
+from cosmic.frame.clock import WALL, ManualClock, RatedClock
 from cosmic.frame.errors import (
     ConfigError,
     DeviceError,
@@ -269,6 +269,22 @@ def test_on_a_fast_clock_whoever_waits_for_samples_gets_a_shorter_piece() -> Non
     after = chunks(board, 1)[0]
     assert after.first_sample == first.volts.shape[1], "nothing is lost or twice"
     assert after.volts.shape == (1, 2000)
+
+
+def test_a_fast_clock_waits_for_who_fetches_what_somebody_waits_for() -> None:
+    clock = RatedClock(100.0, waits=True)
+    board = SimulatedLibrary(clock).open("Dev1")
+    board.configure(inputs(1), 1000.0, 2000)
+    board.start()
+    chunks(board, 1)
+    wanted_s = clock.now_s() + 0.02
+    clock.expect(wanted_s)
+    WALL.sleep(0.1)  # ten seconds of the platform: whoever fetches samples has not come yet
+    assert clock.now_s() < wanted_s + 0.02
+    first = chunks(board, 1)[0]
+    assert clock.now_s() < wanted_s + 0.5, "it hurries on once they are fetched, and not before"
+    assert first.volts.shape[1] < 2000
+    board.close()
 
 
 def test_whoever_begins_to_wait_in_the_midst_of_a_piece_shortens_it() -> None:

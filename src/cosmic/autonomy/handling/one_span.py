@@ -36,6 +36,13 @@ GUESS_TIMES: Final = 1.6
 """So much stiffer than guessed a fibre may be at a span."""
 SURE_TIMES: Final = 2.0
 """The probe comes near a fibre at once but for so many standard deviations of where that is."""
+SURER_TIMES: Final = 8.0
+"""From so many on it goes so slowly that it stops in time however stiff the fibre is there."""
+REACTION_S: Final = 0.03
+"""Until a force that was felt has stopped the probe: a chunk of samples, and a call."""
+STRIDE_UM: Final = 1.0
+"""Of a positioner that is held in place, about as much for each step of its frequency."""
+SLOWEST_HZ: Final = 10.0
 SLOW_UM: Final = 100.0
 """How far before where it goes to the probe becomes slow: it may come from far away."""
 MET_STD_UM: Final = 0.7
@@ -211,28 +218,25 @@ class OneSpan:
             side = -1.0 if self._fibre.tilts % 2 else 1.0
             yield work.go_up(work.hold_tip_um + side * push.tilt_um * part)
         # Only where the fibre was met before is it known well enough to come nearer at once.
-        known = bool(self._fibre.contacts)
-        yield from self._come_to(surface - push.near_um - SURE_TIMES * std if known else aside)
+        near = surface - push.near_um
+        if self._fibre.contacts:
+            yield from self._come_to(near - SURE_TIMES * std, near - SURER_TIMES * std)
+        else:
+            yield from self._come_to(aside, aside)
 
-    def _come_to(self, probe_um: float) -> Steps:
+    def _come_to(self, probe_um: float, sure_um: float) -> Steps:
         """Go there, and back again as long as something is felt that should not be there.
 
         The probe goes slowly, and no further where it feels something: nothing is known to be
-        there, and a short span is stiff.
+        there, and a short span is stiff. Beyond `sure_um` it goes as slowly as that asks for.
         """
         work, push, back = self._work, self._push, 0.0
         zero = self._fibre.zero_un or 0.0
-        axis = work.mico[self._probe.y_axis]
         _, y = work.tip_now(self._probe)
         if self._to_probe(y) < probe_um - SLOW_UM:
             yield self._to_travel(probe_um - SLOW_UM)
         while True:
-            axis.set_closed_loop_frequency(min(push.slow_hz, work.settings.frequency_hz))
-            try:
-                low, high = zero - push.surprise_un, zero + push.surprise_un
-                yield self._careful(probe_um - back, low, high)
-            finally:
-                axis.set_closed_loop_frequency(work.settings.frequency_hz)
+            yield from self._feel_along(probe_um - back, sure_um, zero)
             force = yield from self._mean_un(push.search_average_s)
             if abs(force - zero) <= 2.0 * push.contact_un:
                 return
@@ -241,6 +245,25 @@ class OneSpan:
                 raise OperationFailed(
                     OBSTRUCTED, f"the probe feels {force:.0f} uN where nothing should be"
                 )
+
+    def _feel_along(self, to_um: float, sure_um: float, zero_un: float) -> Steps:
+        """Go there slowly, and no further where something is felt."""
+        work, push = self._work, self._push
+        low, high = zero_un - push.surprise_un, zero_un + push.surprise_un
+        axis, fast_hz = work.mico[self._probe.y_axis], work.settings.frequency_hz
+        slow_hz = min(push.slow_hz, fast_hz)
+        _, y = work.tip_now(self._probe)
+        try:
+            if self._to_probe(y) < sure_um < to_um:
+                axis.set_closed_loop_frequency(slow_hz)
+                move = yield self._careful(sure_um, low, high)
+                if isinstance(move, CarefulMove) and move.felt_un is not None:
+                    return
+            hertz = min(slow_hz, self._stopping_hz()) if to_um > sure_um else slow_hz
+            axis.set_closed_loop_frequency(hertz)
+            yield self._careful(to_um, low, high)
+        finally:
+            axis.set_closed_loop_frequency(fast_hz)
 
     def _mean_un(self, seconds: float) -> Generator[Yielded, object, float]:
         mean = yield self._work.forces.wanted(seconds, settle_s=self._push.settle_s)
@@ -263,13 +286,22 @@ class OneSpan:
         yield from self._advance(probe_um)
         return (yield from self._measure(seconds, loading=loading))
 
-    def _step_um(self) -> float:
-        """Return the largest step at which even the stiffest fibre pushes back little enough."""
+    def _stiffest_un_um(self) -> float:
+        """Return how stiff the fibre may be here, uN/um."""
         ei = self._push.stiffest_ei_n_m2
         if self._fibre.ei_guess_n_m2 is not None:
             ei = min(ei, GUESS_TIMES * self._fibre.ei_guess_n_m2)
-        stiffness = 3.0 * ei * UN_UM2 / self._plan.span_um**3
-        return min(self._push.search_step_um, LIMIT_PART * self._push.limit_un / stiffness)
+        return 3.0 * ei * UN_UM2 / self._plan.span_um**3
+
+    def _step_um(self) -> float:
+        """Return the largest step at which even the stiffest fibre pushes back little enough."""
+        push = self._push
+        return min(push.search_step_um, LIMIT_PART * push.limit_un / self._stiffest_un_um())
+
+    def _stopping_hz(self) -> float:
+        """Return how fast the probe may go to be stopped before the force is too high."""
+        reach_um = self._push.limit_un / self._stiffest_un_um()
+        return max(reach_um / (REACTION_S * STRIDE_UM), SLOWEST_HZ)
 
     def _search(self, base_un: float) -> Generator[Yielded, object, float]:
         push, step = self._push, self._step_um()

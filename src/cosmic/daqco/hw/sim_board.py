@@ -36,6 +36,10 @@ FIFO_SAMPLES: Final = 4095
 LATE_S: Final = 0.04
 """So late may the receiver be, by the wall, before the platform's time waits for it."""
 
+EXPECTED_LATE_S: Final = 0.002
+"""The same where somebody waits for what there is by then, by the platform's time: a movement that
+a force ends is to end as soon on a fast clock as on that of the wall."""
+
 EDGE_SAMPLES: Final = 1e-3
 """What is asked for up to a sample is asked for with that sample, whatever the rounding."""
 
@@ -197,7 +201,7 @@ class SimulatedBoard(Board):
             self._pieces.first = -1
             start_s = math.inf if self._start_trigger else self._clock.now_s()
             run = _Run(self._setup, start_s, self._clock.horizon())
-            run.horizon.move_to(self._horizon_s(self._due_s(run)))
+            run.horizon.move_to(self._horizon_s(run, self._due_s(run)))
             self._run = run
             self._hear_expected()
         if self._start_trigger:
@@ -261,7 +265,7 @@ class SimulatedBoard(Board):
             while run is not None and self._run is run:
                 self._check_going(run)
                 due_s = self._due_s(run)
-                run.horizon.move_to(self._horizon_s(due_s))
+                run.horizon.move_to(self._horizon_s(run, due_s))
                 now_s = self._clock.now_s()
                 if due_s <= now_s:
                     self._receiver.busy()  # until it has handed the chunk on, and comes again
@@ -306,12 +310,22 @@ class SimulatedBoard(Board):
     def _expected(self, time_s: float) -> None:
         with self._faults.changed:
             run = self._run
-            if run is not None and time_s < run.time_s(run.due_sample):
+            if run is None:
+                return
+            fetched = run.due_sample <= run.next_sample  # and nobody has come for the next yet
+            due = run.next_sample + run.setup.chunk_samples if fetched else run.due_sample
+            if time_s < run.time_s(due):
+                # Already now: whoever fetches samples may come late to hear of it.
+                run.horizon.move_to(max(time_s, self._clock.now_s()) + EXPECTED_LATE_S)
                 self._faults.changed.notify_all()
 
-    def _horizon_s(self, due_s: float) -> float:
+    def _horizon_s(self, run: _Run, due_s: float) -> float:
         """Return how far the platform's time may go before what is due then is fetched."""
-        return due_s + LATE_S * max(1.0, self._clock.rate) if due_s > -math.inf else math.inf
+        if not self._paced:
+            return math.inf
+        if run.due_sample < run.next_sample + run.setup.chunk_samples:
+            return due_s + EXPECTED_LATE_S
+        return due_s + LATE_S * max(1.0, self._clock.rate)
 
     def _check_going(self, run: _Run) -> None:
         """End the acquisition and raise when it failed; the lock is held."""

@@ -108,6 +108,18 @@ def test_all_are_fitted_again_where_friction_is_far_from_before(
     assert again[0].spans[0].by_friction != 0.0
 
 
+def test_nothing_is_fitted_again_where_friction_comes_back(
+    fibres: list[MeasuredFibre], fitted: list[float | None]
+) -> None:
+    refits = Refits()
+    _, before = refits.about(fibres[:-1], 0.1)
+    refits.about(fibres, 0.2)
+    friction, after = refits.about(fibres, 0.11)
+    assert friction == 0.1
+    assert fitted == [0.1] * (FIBRES - 1) + [0.2] * FIBRES + [0.1], "and the one that is new"
+    assert [each.spans for each in after[:-1]] == [each.spans for each in before]
+
+
 def test_a_fibre_pushed_again_is_fitted_again(
     session: Session, fibres: list[MeasuredFibre], fitted: list[float | None]
 ) -> None:

@@ -191,3 +191,31 @@ def test_an_arm_that_has_begun_counts_as_one_more_before_it_has_chosen(
     assert shared.enough(), "two are wanted, and two are at work"
     shared.seeking.discard("right")
     assert not shared.enough()
+
+
+def test_what_is_known_of_fibres_is_what_is_written_whichever_ends_first(desk: Desk) -> None:
+    def told() -> list[tuple[int, Outcome]]:
+        return [(each.number, each.outcome) for each in desk.recorder.fibres]
+
+    def written() -> list[tuple[int, Outcome]]:
+        return [(each.number, each.outcome) for each in desk.store.reader.fibres()]
+
+    left, right = desk.take("left", 1), desk.take("right", 2)
+    desk.does("left", "look")
+    desk.does("right", "look")
+    desk.finish(right)
+    assert told() == written() == [(1, Outcome.RUNNING), (2, Outcome.GOOD)]
+    third = desk.take("right", 3)
+    desk.does("right", "look")
+    desk.finish(left)
+    assert told() == written()
+    assert desk.recorder.progress().done == 2
+    desk.clock.advance(5.0)
+    before_s = desk.recorder.progress().elapsed_s
+    desk.clock.advance(5.0)
+    assert desk.recorder.progress().elapsed_s == before_s + 5.0
+    desk.finish(third)
+    assert told() == written()
+    assert desk.recorder.progress().done == 3
+    desk.recorder.worked_off += 1
+    assert desk.recorder.progress().plates == 1

@@ -47,6 +47,7 @@ PROBE = ToolSettings(
     width_um=50.0,
 )
 CLAMP_UM, SENSOR_UN_UM, WIDTH_UM, ZERO_UN = 9.0, 800.0, 30.0, 1.3
+STRIDE_UM = 0.66
 
 
 class Done:
@@ -87,6 +88,7 @@ class Going(Done):
             for each in tuple(self.bench.listeners):
                 each()
             if self.cancelled:
+                self._run_on()
                 self.done = True
                 raise MoveCancelled("cancelled")
         self.done = True
@@ -95,6 +97,12 @@ class Going(Done):
     @override
     def cancel(self) -> None:
         self.cancelled = True
+
+    def _run_on(self) -> None:
+        """Go as far as the probe goes until it has stopped."""
+        bench = self.bench
+        bench.at_um["probe.y"] -= bench.reaction_s * STRIDE_UM * bench.frequency_hz
+        bench.at_once_un = max(bench.at_once_un, bench.force_un())
 
 
 class Axis:
@@ -160,6 +168,7 @@ class Bench(HandlingContext):
         self.reach_um, self.lost = math.inf, False
         self.listeners, self.felt_un, self.frequency_hz = list[Any](), ZERO_UN, 0.0
         self.peak_un, self.random = 0.0, np.random.default_rng(3)
+        self.reaction_s = 0.0
         self.microscope = SimpleNamespace(name="microscope", problem="")
         line = np.column_stack([np.linspace(0.0, length_um, 61), np.zeros(61)])
         reach = Reach(Candidate(line, length_um, WIDTH_UM, 0.0, 60.0), 0.0, line, (250.0, 0.0))
@@ -462,6 +471,23 @@ def test_a_fibre_that_has_moved_towards_the_probe_is_hardly_touched_by_its_appro
     assert 0.0 < bench.at_once_un < 12.0
     assert len(bench.held_fibre().spans) == 5
     assert bench.frequency_hz == bench.settings.frequency_hz
+
+
+@pytest.mark.parametrize("ei_n_m2", [2e-11, 1.5e-10, 4e-10])
+def test_a_fibre_that_has_moved_is_felt_before_the_probe_could_be_stopped_too_late(ei_n_m2: float):
+    bench = Bench(ei_n_m2)
+    bench.reaction_s = 0.03  # samples come in chunks, and a call takes its time
+    steps = PushSpans().run(bench)
+    result: object = None
+    while True:
+        try:
+            wish = steps.send(result)
+        except StopIteration:
+            break
+        bench.off_um = 12.0 if len(bench.held_fibre().spans) == 4 else 0.0
+        result = wish.wait(0.0) if hasattr(wish, "wait") else None
+    assert bench.at_once_un < bench.settings.push.limit_un
+    assert len(bench.held_fibre().spans) == 5
 
 
 def test_a_fibre_that_is_not_there_is_reported_with_the_position():
