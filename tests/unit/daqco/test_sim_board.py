@@ -280,7 +280,7 @@ def test_a_fast_clock_waits_for_who_fetches_what_somebody_waits_for() -> None:
     wanted_s = clock.now_s() + 0.02
     clock.expect(wanted_s)
     WALL.sleep(0.1)  # ten seconds of the platform: whoever fetches samples has not come yet
-    assert clock.now_s() < wanted_s + 0.02
+    assert clock.now_s() < wanted_s + 0.05
     first = chunks(board, 1)[0]
     assert clock.now_s() < wanted_s + 0.5, "it hurries on once they are fetched, and not before"
     assert first.volts.shape[1] < 2000

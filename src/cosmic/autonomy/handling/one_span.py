@@ -1,6 +1,7 @@
 """One push of one span: the probe finds the fibre, bends it, lets it go, and keeps what it read."""
 
 import logging
+import math
 from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Final
@@ -42,7 +43,7 @@ REACTION_S: Final = 0.03
 """Until a force that was felt has stopped the probe: a chunk of samples, and a call."""
 STRIDE_UM: Final = 1.0
 """Of a positioner that is held in place, about as much for each step of its frequency."""
-SLOWEST_HZ: Final = 10.0
+SLOWEST_HZ: Final = 10
 SLOW_UM: Final = 100.0
 """How far before where it goes to the probe becomes slow: it may come from far away."""
 MET_STD_UM: Final = 0.7
@@ -298,10 +299,10 @@ class OneSpan:
         push = self._push
         return min(push.search_step_um, LIMIT_PART * push.limit_un / self._stiffest_un_um())
 
-    def _stopping_hz(self) -> float:
+    def _stopping_hz(self) -> int:
         """Return how fast the probe may go to be stopped before the force is too high."""
         reach_um = self._push.limit_un / self._stiffest_un_um()
-        return max(reach_um / (REACTION_S * STRIDE_UM), SLOWEST_HZ)
+        return max(math.floor(reach_um / (REACTION_S * STRIDE_UM)), SLOWEST_HZ)
 
     def _search(self, base_un: float) -> Generator[Yielded, object, float]:
         push, step = self._push, self._step_um()

@@ -36,9 +36,10 @@ FIFO_SAMPLES: Final = 4095
 LATE_S: Final = 0.04
 """So late may the receiver be, by the wall, before the platform's time waits for it."""
 
-EXPECTED_LATE_S: Final = 0.002
+EXPECTED_LATE_S: Final = 0.02
 """The same where somebody waits for what there is by then, by the platform's time: a movement that
-a force ends is to end as soon on a fast clock as on that of the wall."""
+a force ends is to end as soon on a fast clock as on that of the wall. Boards that are fetched one
+after the other began some milliseconds apart."""
 
 EDGE_SAMPLES: Final = 1e-3
 """What is asked for up to a sample is asked for with that sample, whatever the rounding."""
@@ -268,6 +269,7 @@ class SimulatedBoard(Board):
                 run.horizon.move_to(self._horizon_s(run, due_s))
                 now_s = self._clock.now_s()
                 if due_s <= now_s:
+                    run.horizon.move_to(self._usual_horizon_s(due_s))  # it has come
                     self._receiver.busy()  # until it has handed the chunk on, and comes again
                     return run
                 self._receiver.idle()
@@ -316,16 +318,18 @@ class SimulatedBoard(Board):
             due = run.next_sample + run.setup.chunk_samples if fetched else run.due_sample
             if time_s < run.time_s(due):
                 # Already now: whoever fetches samples may come late to hear of it.
-                run.horizon.move_to(max(time_s, self._clock.now_s()) + EXPECTED_LATE_S)
+                wanted_s = max(run.time_s(run.first_at(time_s)), self._clock.now_s())
+                run.horizon.move_to(wanted_s + EXPECTED_LATE_S)
                 self._faults.changed.notify_all()
 
     def _horizon_s(self, run: _Run, due_s: float) -> float:
         """Return how far the platform's time may go before what is due then is fetched."""
-        if not self._paced:
-            return math.inf
-        if run.due_sample < run.next_sample + run.setup.chunk_samples:
+        if self._paced and run.due_sample < run.next_sample + run.setup.chunk_samples:
             return due_s + EXPECTED_LATE_S
-        return due_s + LATE_S * max(1.0, self._clock.rate)
+        return self._usual_horizon_s(due_s)
+
+    def _usual_horizon_s(self, due_s: float) -> float:
+        return due_s + LATE_S * max(1.0, self._clock.rate) if self._paced else math.inf
 
     def _check_going(self, run: _Run) -> None:
         """End the acquisition and raise when it failed; the lock is held."""

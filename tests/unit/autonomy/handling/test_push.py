@@ -118,6 +118,7 @@ class Axis:
         return round(self.bench.at_um[self.name], 1)
 
     def set_closed_loop_frequency(self, frequency_hz: float) -> None:
+        assert float(frequency_hz).is_integer(), "controllers take whole numbers"
         self.bench.frequency_hz = frequency_hz
 
 
