@@ -287,6 +287,24 @@ def test_a_fast_clock_waits_for_who_fetches_what_somebody_waits_for() -> None:
     board.close()
 
 
+def test_whoever_waits_for_a_board_that_waits_for_its_trigger_holds_up_nobody() -> None:
+    clock = RatedClock(100.0, waits=True)
+    triggers = {"Dev2": "/Dev1/ai/StartTrigger"}
+    library = SimulatedLibrary(clock, start_triggers=triggers)
+    first, second = (library.open(name) for name in ("Dev1", "Dev2"))
+    for board in (second, first):
+        board.configure(inputs(1), 1000.0, 200)
+    second.start()
+    began_s = clock.now_s()
+    clock.expect(began_s + 0.02)
+    WALL.sleep(0.05)
+    assert clock.now_s() > began_s + 2.0, "nothing is sampled yet that could be late"
+    first.start()
+    assert [chunks(board, 1)[0].first_sample for board in (first, second)] == [0, 0]
+    for board in (first, second):
+        board.close()
+
+
 def test_whoever_begins_to_wait_in_the_midst_of_a_piece_shortens_it() -> None:
     clock = RatedClock(20.0)
     board = SimulatedLibrary(clock).open("Dev1")

@@ -312,7 +312,7 @@ class SimulatedBoard(Board):
     def _expected(self, time_s: float) -> None:
         with self._faults.changed:
             run = self._run
-            if run is None:
+            if run is None or math.isinf(run.start_s) or not self._paced:
                 return
             fetched = run.due_sample <= run.next_sample  # and nobody has come for the next yet
             due = run.next_sample + run.setup.chunk_samples if fetched else run.due_sample
