@@ -287,7 +287,9 @@ def test_a_fast_clock_waits_for_who_fetches_what_somebody_waits_for() -> None:
     board.close()
 
 
-def test_whoever_waits_for_a_board_that_waits_for_its_trigger_holds_up_nobody() -> None:
+def test_whoever_waits_for_a_board_that_waits_for_its_trigger_holds_up_nobody(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     clock = RatedClock(100.0, waits=True)
     triggers = {"Dev2": "/Dev1/ai/StartTrigger"}
     library = SimulatedLibrary(clock, start_triggers=triggers)
@@ -299,6 +301,7 @@ def test_whoever_waits_for_a_board_that_waits_for_its_trigger_holds_up_nobody() 
     clock.expect(began_s + 0.02)
     WALL.sleep(0.05)
     assert clock.now_s() > began_s + 2.0, "nothing is sampled yet that could be late"
+    assert not caplog.records
     first.start()
     assert [chunks(board, 1)[0].first_sample for board in (first, second)] == [0, 0]
     for board in (first, second):
