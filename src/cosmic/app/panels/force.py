@@ -492,13 +492,20 @@ class ForcePanel(QWidget):
             self._say("calibrate where the boards are", refused=True)
             return
         try:
-            reach_of(self._daqco, self._channel)
+            reach = reach_of(self._daqco, self._channel)
         except CosmicError as exc:
             self._say(str(exc), refused=True)
             return
         if self._is_measuring():
             return
-        dialog = ForceCalibrationDialog(self._daqco, self._channel, self, running=self._running)
+        dialog = ForceCalibrationDialog(
+            self._daqco,
+            self._channel,
+            self,
+            running=self._running,
+            reach=reach,
+            name=self._daqco.own_scale_name(self._channel),
+        )
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         open_beside(dialog)
 

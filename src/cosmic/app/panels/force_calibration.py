@@ -10,8 +10,8 @@ from cosmic.autonomy.calibrating.force_scale import (
     CalibrationProblem,
     ForceCalibration,
     ForceScaleResult,
+    Reach,
     RestingForce,
-    reach_of,
     weight,
 )
 from cosmic.autonomy.handling.force import ForceWatch
@@ -34,18 +34,18 @@ LINES: Final = 6
 """Of text that there is room for, so that nothing moves when it changes."""
 
 _START_TIP: Final = "Begin with these weights"
-MASSES: Final = "give masses in milligrams, such as 1, 2, 5, or 0.5; 1"
+MASSES: Final = "give masses in milligrams with a comma between, such as 0.5, 1, 2"
 
 
 def masses_of(text: str) -> list[float]:
-    """Return the masses that were typed, with a comma or a semicolon between.
+    """Return the masses that were typed, with a comma between.
 
     Raises
     ------
     QuantityError
         One of them is no number; the text says what to do.
     """
-    parts = [each.strip() for each in text.split(";" if ";" in text else ",")]
+    parts = [each.strip() for each in text.split(",")]
     while parts and not parts[-1]:
         parts.pop()
     if not parts:
@@ -67,11 +67,10 @@ class ForceCalibrationDialog(FieldDialog):
         The one that is calibrated.
     running : callable, optional
         Names what measures with the scale just now; "" where nothing does.
-
-    Raises
-    ------
-    CosmicError
-        There is no such channel.
+    reach : Reach, optional
+        No weight may be heavier.
+    name : str, optional
+        Of the new scale; that of the one before if None.
     """
 
     def __init__(
@@ -81,10 +80,13 @@ class ForceCalibrationDialog(FieldDialog):
         parent: QWidget | None = None,
         *,
         running: Callable[[], str] = str,
+        reach: Reach | None = None,
+        name: str | None = None,
     ) -> None:
         super().__init__(parent)
         self.setWindowTitle(f"Calibrate {channel}")
         self._daqco, self._channel, self._running = daqco, channel, running
+        self._reach, self._name = reach, name
         self._watch = ForceWatch(daqco, channel, WALL)
         self._watch.open()
         self._calibration: ForceCalibration | None = None
@@ -93,7 +95,7 @@ class ForceCalibrationDialog(FieldDialog):
         self._looks = 0
         self.found: ForceScaleResult | None = None
         self.weights = named(
-            tipped(QLineEdit("1, 2, 5"), "Masses of the weights, mg, such as 1, 2, 5 or 0.5; 1"),
+            tipped(QLineEdit("1, 2, 5"), "Masses of the weights, mg, such as 0.5, 1, 2"),
             "calibrationWeights",
         )
         self.expanded = ValueField("Expanded uncertainty of the masses, k = 2", "%")
@@ -159,8 +161,7 @@ class ForceCalibrationDialog(FieldDialog):
         try:
             masses = masses_of(self.weights.text())
             loads = [weight(each, self.expanded.value()) for each in masses]
-            reach = reach_of(self._daqco, self._channel)
-            self._calibration = ForceCalibration(loads, reach=reach)
+            self._calibration = ForceCalibration(loads, reach=self._reach)
         except CosmicError as exc:
             self._say(str(exc), refused=True)
             return
@@ -244,7 +245,7 @@ class ForceCalibrationDialog(FieldDialog):
             self._say(f"{what} measures with this scale: end it first", refused=True)
             return
         after = self.found.applied_to(before)
-        own = Scale(self._daqco.own_scale_name(self._channel), after.unit, after.coefficients)
+        own = Scale(self._name or after.name, after.unit, after.coefficients)
         try:
             self._daqco.set_scale(self._channel, own)
         except CosmicError as exc:
