@@ -39,10 +39,6 @@ SURE_TIMES: Final = 2.0
 """The probe comes near a fibre at once but for so many standard deviations of where that is."""
 SURER_TIMES: Final = 8.0
 """From so many on it goes so slowly that it stops in time however stiff the fibre is there."""
-REACTION_S: Final = 0.03
-"""Until a force that was felt has stopped the probe: a chunk of samples, and a call."""
-STRIDE_UM: Final = 1.0
-"""Of a positioner that is held in place, about as much for each step of its frequency."""
 SLOWEST_HZ: Final = 10
 SLOW_UM: Final = 100.0
 """How far before where it goes to the probe becomes slow: it may come from far away."""
@@ -301,8 +297,9 @@ class OneSpan:
 
     def _stopping_hz(self) -> int:
         """Return how fast the probe may go to be stopped before the force is too high."""
-        reach_um = self._push.limit_un / self._stiffest_un_um()
-        return max(math.floor(reach_um / (REACTION_S * STRIDE_UM)), SLOWEST_HZ)
+        push = self._push
+        reach_um = push.limit_un / self._stiffest_un_um()
+        return max(math.floor(reach_um / (push.reaction_s * push.stride_um)), SLOWEST_HZ)
 
     def _search(self, base_un: float) -> Generator[Yielded, object, float]:
         push, step = self._push, self._step_um()

@@ -193,6 +193,10 @@ class PushSettings(StrictModel):
     slow_hz, surprise_un : float
         Closed-loop frequency of the probe as it comes near a fibre, which limits its speed, and the
         force above the baseline that ends that.
+    reaction_s, stride_um : float
+        How long it takes until a force that is felt has stopped the probe, and how far that goes
+        for each step of its frequency: where a fibre may be, it goes only as fast as it can be
+        stopped before the force is too high.
     search_um : float
         How far beyond where the fibre should be it looks.
     search_step_um : float
@@ -246,6 +250,8 @@ class PushSettings(StrictModel):
     near_um: float = Field(2.0, gt=0.0)
     slow_hz: float = Field(500.0, ge=1.0, le=18500.0)
     surprise_un: float = Field(6.0, gt=0.0)
+    reaction_s: float = Field(0.03, gt=0.0)
+    stride_um: float = Field(1.0, gt=0.0)
     search_um: float = Field(120.0, gt=0.0)
     search_step_um: float = Field(8.0, gt=0.0)
     stiffest_ei_n_m2: float = Field(4e-10, gt=0.0)
