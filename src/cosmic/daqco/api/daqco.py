@@ -373,8 +373,18 @@ class Daqco(Declared):
         return value
 
     def own_scale_name(self, channel: str) -> str:
-        """Return the name of a channel's scale, or another one where other channels have that."""
-        name = self.scales[channel].name
+        """Return the name of a channel's scale, or another one where other channels have that.
+
+        Raises
+        ------
+        ConfigError
+            There is no such channel.
+        """
+        scales = self.scales
+        if channel not in scales:
+            names = ", ".join(scales)
+            raise ConfigError(f"there is no channel {channel!r}; there are {names}")
+        name = scales[channel].name
         taken = {each.scale for each in self.settings.channel if each.name != channel}
         while name in taken:
             name = f"{name} ({channel})"
