@@ -103,11 +103,11 @@ class AuditTrail(WorkerThread):
     def _write(self, lines: list[str]) -> None:
         try:
             try:
-                largest = self._path.stat().st_size > LARGEST_BYTES
+                full = self._path.stat().st_size > LARGEST_BYTES
             except FileNotFoundError:
                 self._path.parent.mkdir(parents=True, exist_ok=True)
-                largest = False
-            if largest:
+                full = False
+            if full:
                 self._path.replace(self._path.with_name(self._path.name + ".1"))
             # What is no text, such as a path of the system's own, is written as its number.
             with self._path.open("a", encoding="utf-8", errors="backslashreplace") as file:

@@ -12,31 +12,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Self
 
+from cosmic.autonomy.campaign.storage_format import RESULT_CELLS
+
 RESULTS: Final = "results"
 """What an analysis writes: it can be had again from the raw files, and takes no part in `fibre`."""
 SUMS: Final = "sums_json"
 ANALYSIS: Final = "analysis_json"
 TABLES: Final = ("campaign", "run", "calibration", "picture", "operation", "plate", "sighting")
-RESULT_CELLS: Final = frozenset(
-    {
-        "ei_n_m2",
-        "ei_low_n_m2",
-        "ei_high_n_m2",
-        "clamp_offset_um",
-        "clamp_offset_std_um",
-        "chi2",
-        "freedom",
-        "trusted",
-        "flags",
-        "reasons",
-        "used_spans",
-        "budget_json",
-        "scale_verified",
-        "notes",
-    }
-)
-"""Cells of a fibre that an analysis writes."""
-
 _Rows = list[dict[str, Any]]
 
 

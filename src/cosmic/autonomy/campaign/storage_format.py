@@ -155,6 +155,21 @@ RESULT_NUMBERS: Final = (
     "clamp_offset_std_um",
     "chi2",
 )
+RESULT_CELLS: Final = frozenset(
+    {
+        *RESULT_NUMBERS,
+        "freedom",
+        "trusted",
+        "flags",
+        "reasons",
+        "used_spans",
+        "budget_json",
+        "scale_verified",
+        "notes",
+    }
+)
+"""Cells of a fibre that an analysis writes: those of `result_row`."""
+
 SPAN_NUMBERS: Final = (
     "place_um",
     "k_un_um",

@@ -27,6 +27,7 @@ from cosmic.autonomy.campaign.records import (
     Outcome,
     Pose,
 )
+from cosmic.autonomy.campaign.storage_format import RESULT_CELLS, result_row
 from cosmic.autonomy.campaign.store import LOCK, CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from unit.autonomy.campaign.sample_records import INFO, failed, good
@@ -444,3 +445,9 @@ def test_a_raw_file_written_just_before_the_end_is_no_stranger(tmp_path: Path) -
     with CampaignStore.open(tmp_path) as store:
         store.interrupt_running()
     assert altered_files(CampaignReader(tmp_path)) == ()
+
+
+def test_the_cells_of_a_result_are_those_that_an_analysis_writes() -> None:
+    record = good(1)
+    assert record.bending is not None
+    assert set(result_row(record.bending)) == RESULT_CELLS

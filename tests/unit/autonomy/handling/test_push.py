@@ -458,8 +458,8 @@ def test_a_fibre_that_is_suddenly_much_stiffer_ends_its_push_and_not_the_campaig
     assert not bench.listeners
 
 
-def test_a_fibre_that_has_moved_towards_the_probe_is_hardly_touched_by_its_approach():
-    bench = Bench(1.5e-10)
+def pushed_where_it_moves(bench: Bench, off_um: float, *, after: int) -> None:
+    """Push a fibre that lies so far off once so many spans were pushed."""
     steps = PushSpans().run(bench)
     result: object = None
     while True:
@@ -467,8 +467,13 @@ def test_a_fibre_that_has_moved_towards_the_probe_is_hardly_touched_by_its_appro
             wish = steps.send(result)
         except StopIteration:
             break
-        bench.off_um = 30.0 if bench.held_fibre().spans else 0.0
+        bench.off_um = off_um if len(bench.held_fibre().spans) >= after else 0.0
         result = wish.wait(0.0) if hasattr(wish, "wait") else None
+
+
+def test_a_fibre_that_has_moved_towards_the_probe_is_hardly_touched_by_its_approach():
+    bench = Bench(1.5e-10)
+    pushed_where_it_moves(bench, 30.0, after=1)
     assert 0.0 < bench.at_once_un < 12.0
     assert len(bench.held_fibre().spans) == 5
     assert bench.frequency_hz == bench.settings.frequency_hz
@@ -478,15 +483,7 @@ def test_a_fibre_that_has_moved_towards_the_probe_is_hardly_touched_by_its_appro
 def test_a_fibre_that_has_moved_is_felt_before_the_probe_could_be_stopped_too_late(ei_n_m2: float):
     bench = Bench(ei_n_m2)
     bench.reaction_s = 0.03  # samples come in chunks, and a call takes its time
-    steps = PushSpans().run(bench)
-    result: object = None
-    while True:
-        try:
-            wish = steps.send(result)
-        except StopIteration:
-            break
-        bench.off_um = 12.0 if len(bench.held_fibre().spans) == 4 else 0.0
-        result = wish.wait(0.0) if hasattr(wish, "wait") else None
+    pushed_where_it_moves(bench, 12.0, after=4)
     assert bench.at_once_un < bench.settings.push.limit_un
     assert len(bench.held_fibre().spans) == 5
 
